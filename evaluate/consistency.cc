@@ -280,11 +280,11 @@ ConsistencyReport EvaluateConsistency(const FrameSource& reference,
                        "leave it out, or choose another mode");
     return EvaluateWarped(reference, sequences, options, progress);
   }
-  return EvaluateConsistency(reference.count,
-                             EstimatedMotion(reference, options.mode, options.flow,
-                                             FramesBetween(options.gaps, reference.count),
-                                             options.flow_frames),
-                             sequences, options, progress);
+  return EvaluateConsistency(
+      reference.count,
+      EstimatedMotion(reference, options.mode, options.flow,
+                      FramesBetween(options.gaps, reference.count), options.flow_frames),
+      sequences, options, progress);
 }
 
 }  // namespace regrade

@@ -96,7 +96,7 @@ struct WarpedRow {
   int gap = 0;
   int pairs = 0;
   WarpedError published, corrected;
-  std::string why;  // why a reading is missing; else empty
+  std::string why;                             // why a reading is missing; else empty
   std::optional<PairedDifference> difference;  // of the corrected RMSE, as of ConsistencyRow
 };
 
@@ -104,8 +104,8 @@ struct ConsistencyReport {
   std::string mode, flow, warp = "later", error_per = "channel";
   int frames = 0, width = 0, height = 0;  // 0 where no pair was compared
   std::string compared_with;              // the sequence of the rows' differences; or empty
-  std::vector<ConsistencyRow> rows;  // by sequence, then by gap, in the order given
-  std::vector<PairResult> pairs;     // by first frame, gap, sequence
+  std::vector<ConsistencyRow> rows;       // by sequence, then by gap, in the order given
+  std::vector<PairResult> pairs;          // by first frame, gap, sequence
   // In the order of rows; rows whose pairs are all perfect or undefined have none.
   std::vector<WorstPair> worst;
   // Instead of the others in mode stylegaussian, in the same orders.

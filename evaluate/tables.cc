@@ -53,8 +53,7 @@ void AddDifference(const ConsistencyReport& report,
 }
 
 std::string ConsistencyTable(const ConsistencyReport& report, const TableContext& context) {
-  std::vector<TableCells> rows{
-      {"sequence", "gap", "pairs", "undefined", "mean of dB", "95 %"}};
+  std::vector<TableCells> rows{{"sequence", "gap", "pairs", "undefined", "mean of dB", "95 %"}};
   AddDifferenceHead(report, context, &rows[0]);
   rows[0].insert(rows[0].end(), {"dB of mean", "without mask", "compared"});
   std::string remarks;
@@ -111,8 +110,7 @@ std::string WarpedTable(const ConsistencyReport& report, const TableContext& con
       rows.back().push_back(TableNumber(row.published.lpips, 4));
       rows.back().push_back(TableNumber(row.corrected.lpips, 4));
     }
-    if (!row.why.empty())
-      remarks += Concat(name, ", gap ", row.gap, ": ", row.why, "\n");
+    if (!row.why.empty()) remarks += Concat(name, ", gap ", row.gap, ": ", row.why, "\n");
   }
   for (const std::string& remark : context.remarks) remarks += remark + "\n";
   return FormatTable(

@@ -151,8 +151,8 @@ std::vector<CheckedRequirement> RunStyle(const std::string& first, const std::st
       PrintSummary(*context, context->console->Seconds() - begin);
     }
     if (until == "report")
-      checked = CheckRequirements(required, ReportFromRecords(*context->workspace, workspace),
-                                  name);
+      checked =
+          CheckRequirements(required, ReportFromRecords(*context->workspace, workspace), name);
   }
   context->style = nullptr;
   return checked;
@@ -190,8 +190,7 @@ void RunStyles(const std::string& first, const std::vector<NamedStyle>& styles,
     context->settings.style = given;
   }
   if (start.dry_run) return SayPlan(*context);
-  if (styles.size() > 1)
-    console->Info("took " + DurationText(console->Seconds()) + " in all");
+  if (styles.size() > 1) console->Info("took " + DurationText(console->Seconds()) + " in all");
   FinishRequirements(checked, start.junit, console);
 }
 

@@ -9,12 +9,13 @@
 namespace regrade {
 namespace {
 
-// Cameras are at one place if they are no farther apart than this fraction of the cameras'
-// median distance from their middle, and look the same way.
-constexpr double kSamePlace = 0.02;
+// Cameras are at one place if they are no farther apart than this fraction of the distance of
+// nine tenths of them from their middle, and look the same way. The median distance would be
+// that within a burst where most photos belong to one.
+constexpr double kSamePlace = 0.01, kMostCameras = 0.9;
 constexpr double kSameWayDeg = 3;
 
-double MedianDistanceFromMiddle(const std::vector<Vec3d>& centers) {
+double DistanceFromMiddle(const std::vector<Vec3d>& centers) {
   Vec3d middle;
   for (int a = 0; a < 3; ++a) {
     std::vector<double> along;
@@ -23,7 +24,7 @@ double MedianDistanceFromMiddle(const std::vector<Vec3d>& centers) {
   }
   std::vector<double> distances;
   for (const Vec3d& center : centers) distances.push_back(Norm(center - middle));
-  return Median(std::move(distances));
+  return Quantile(std::move(distances), kMostCameras);
 }
 
 // The views at each place, in order of the first. Each is near the first one of its place, so
@@ -34,7 +35,7 @@ std::vector<std::vector<size_t>> PlacesOf(const Capture& capture) {
     centers.push_back(view.camera.Center());
     forwards.push_back(view.camera.Forward());
   }
-  const double near = kSamePlace * MedianDistanceFromMiddle(centers);
+  const double near = kSamePlace * DistanceFromMiddle(centers);
   const double cosine = std::cos(kSameWayDeg * M_PI / 180);
   std::vector<std::vector<size_t>> places;
   for (size_t i = 0; i < centers.size(); ++i) {

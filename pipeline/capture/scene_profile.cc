@@ -9,6 +9,7 @@
 #include "pipeline/images/image_file.h"
 #include "pipeline/workspace/metrics_json.h"
 #include "reconstruct/scene/forward_facing.h"
+#include "reconstruct/scene/given_poses.h"
 #include "reconstruct/scene/scene_checks.h"
 #include "reconstruct/scene/visual_hull.h"
 
@@ -161,7 +162,7 @@ SceneProfile ProfileScene(const Capture& capture, int sh_degree, const std::stri
   const double clear = TransparentFraction(silhouettes);
   const bool alpha = decided("alpha", clear > kAlphaFraction);
 
-  const Capture sure = WithParallax(capture);
+  const Capture sure = WithParallax(capture, kLeastParallaxDeg);
   const ForwardFacing forward = MeasureForwardFacing(sure);
   const bool ndc = decided("ndc", forward.on && !alpha);
   profile.effects.push_back(Row("ndc", ndc, forward.angle_deg, kForwardAngle,
@@ -169,7 +170,8 @@ SceneProfile ProfileScene(const Capture& capture, int sh_degree, const std::stri
                                 "to their mean, degrees"));
   profile.effects.push_back(Row("alpha", alpha, clear, kAlphaFraction,
                                 "fraction of transparent pixels, if every photo has some"));
-  const Surroundings surroundings = MeasureSurroundings(sure, box.camera_range);
+  const Surroundings surroundings =
+      MeasureSurroundings(WithParallax(capture, kNoParallaxDeg), box.camera_range);
   const bool background =
       decided("background", surroundings.far_fraction > kFarFraction && !ndc && !alpha);
   if (background && (ndc || alpha))

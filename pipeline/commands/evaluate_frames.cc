@@ -125,11 +125,11 @@ std::vector<int64_t> FlowFrames(const ConsistencyOptions& options, const FrameFo
   // Both are there: files that begin before the first number can only be places.
   const int64_t step = (numbers[1] - numbers[0]) / std::max<int64_t>(1, places[1] - places[0]);
   const bool before = FlowFolder(folder).LeastFrame() < numbers[0] - places[0] * step;
-  console->Warn(Concat(folder, ": the flow of ", frames.names[0], " to ", frames.names[1],
-                       " is taken from the file of frames ",
-                       before ? places[0] : numbers[0], " and ",
-                       before ? places[1] : numbers[1],
-                       before ? ", their places in the folder" : ", the numbers in their names"));
+  console->Warn(
+      Concat(folder, ": the flow of ", frames.names[0], " to ", frames.names[1],
+             " is taken from the file of frames ", before ? places[0] : numbers[0], " and ",
+             before ? places[1] : numbers[1],
+             before ? ", their places in the folder" : ", the numbers in their names"));
   return before ? places : numbers;
 }
 
@@ -165,8 +165,8 @@ void AddSequences(const FramesOptions& frames, const ConsistencyOptions& options
   const ControlInputs inputs{reference, folders->styled[0].Source(), targets.views_2d,
                              targets.style, has_reference};
   std::ranges::move(ControlSequences(inputs), std::back_inserter(measured->sequences));
-  const std::string why = has_reference ? WhyNoLinearMap(inputs)
-                                        : "there are no unstyled frames (--reference)";
+  const std::string why =
+      has_reference ? WhyNoLinearMap(inputs) : "there are no unstyled frames (--reference)";
   if (!why.empty()) measured->missing.push_back({kLinearMapControl, why});
 }
 

@@ -14,7 +14,7 @@ namespace regrade {
 struct FramesOptions {
   std::vector<std::string> frames, label;
   std::string reference, target, style, poses, depth, pst50, out, protocol, table = "text",
-      require, junit;
+                                                                            require, junit;
 
   template <typename Bind>
   void Describe(Bind& bind) {

@@ -67,8 +67,8 @@ void CheckCounts(const FrameFolder& reference, const FrameFolder& sequence) {
                               ? reference.names[count] + " of " + reference.folder
                               : sequence.names[of_reference] + " of " + sequence.folder;
   throw InputError(Concat(count, " frames, the reference has ", of_reference,
-                          ", and their names do not say which belong together; in order, ",
-                          odd, " has no counterpart"),
+                          ", and their names do not say which belong together; in order, ", odd,
+                          " has no counterpart"),
                    sequence.folder, "evaluate the same frames of each");
 }
 
@@ -131,8 +131,9 @@ FramePairing Describe(const FrameFolder& reference, const FrameFolder& sequence,
   const std::string head =
       Concat(count, " frames of ", sequence.folder, " are paired with ", reference.folder);
   if (pairs.by == "order") {
-    pairing.notice = head + " in the order of their names, which have nothing in common: " +
-                     range + "; rename them if these are other moments";
+    pairing.notice = head +
+                     " in the order of their names, which have nothing in common: " + range +
+                     "; rename them if these are other moments";
   } else if (!pairing.left_out.empty() || !pairing.reference_left_out.empty()) {
     pairing.notice = head + " by the " +
                      (pairs.by == "number" ? "numbers in their names" : "same names") + ": " +
@@ -168,9 +169,9 @@ std::vector<FramePairing> PairFolders(FrameFolder* reference,
   for (FrameFolder* sequence : sequences) {
     if (sequence == reference) continue;
     if (reference->width != sequence->width || reference->height != sequence->height)
-      throw InputError("frames of " + SizeText(*sequence) + ", the reference has " +
-                           SizeText(*reference),
-                       sequence->folder, "render all sequences at one size");
+      throw InputError(
+          "frames of " + SizeText(*sequence) + ", the reference has " + SizeText(*reference),
+          sequence->folder, "render all sequences at one size");
     pairs.push_back(PairNames(reference->names, sequence->names));
     if (pairs.back().by == "order") CheckCounts(*reference, *sequence);
     pairings.push_back(Describe(*reference, *sequence, pairs.back()));

@@ -115,8 +115,8 @@ GeometrySource GivenGeometry(const std::string& poses, const std::string& depth,
     paths.push_back(files[static_cast<size_t>(i)]);
   return [paths, cameras = CamerasOf(poses, reference, notices)](int i) -> FrameGeometry {
     const Camera& camera = cameras[static_cast<size_t>(i)];
-    return {DepthAlongRays(camera, ReadDepth(paths[static_cast<size_t>(i)], camera.width,
-                                             camera.height)),
+    return {DepthAlongRays(
+                camera, ReadDepth(paths[static_cast<size_t>(i)], camera.width, camera.height)),
             camera};
   };
 }

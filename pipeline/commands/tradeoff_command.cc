@@ -55,13 +55,12 @@ struct TradeoffOptions {
                   "spreads for 2 or more",
           .min = 1,
           .max = 100});
-    bind(
-        "budget", budget,
-        {.unit = "minutes",
-         .help = "starts no further measurement after this time, the base run included, which "
-                 "is made to its end; the same command continues; 0 has no limit",
-         .min = 0,
-         .max = 1e6});
+    bind("budget", budget,
+         {.unit = "minutes",
+          .help = "starts no further measurement after this time, the base run included, which "
+                  "is made to its end; the same command continues; 0 has no limit",
+          .min = 0,
+          .max = 1e6});
     bind("with-poses", with_poses,
          {.help = "also measure COLMAP's parameters, if photos without poses are given"});
     bind("predict", predict,
@@ -176,8 +175,8 @@ std::string StateOf(const Workspace& workspace, const char* stage) {
 
 // The time of measurements, and of the base run where there was none.
 struct Budget {
-  double begin = 0;         // of the command, in ClockSeconds()
-  double seconds = 0;       // 0: no limit
+  double begin = 0;        // of the command, in ClockSeconds()
+  double seconds = 0;      // 0: no limit
   bool made_base = false;  // in this start
 
   bool Spent() const { return seconds > 0 && ClockSeconds() - begin > seconds; }

@@ -24,8 +24,8 @@
 #include "pipeline/run/resolve_settings.h"
 #include "pipeline/run/run_settings.h"
 #include "pipeline/view/view_session.h"
-#include "pipeline/workspace/workspace.h"
 #include "pipeline/workspace/style_folders.h"
+#include "pipeline/workspace/workspace.h"
 
 namespace regrade {
 namespace {

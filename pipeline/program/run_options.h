@@ -47,8 +47,7 @@ struct RunOptions {
     bind("out", out,
          {.help = "the output folder; the same command again continues what is in it"});
     bind("preset", preset,
-         {.help = "trade-off between accuracy and time; smoke only shows that everything runs; "
-                  "single options override it",
+         {.help = "trade-off between accuracy and time; smoke only shows that everything runs",
           .choices = "smoke|draft|standard|paper|best"});
     bind("paper-config", paper_config,
          {.help = kPaperConfigHelp, .choices = "auto|syn|llff|tnt|custom"});

@@ -15,18 +15,18 @@ struct ConsistencyMetrics {
   std::string
       sequence;  // "source" | "views_2d" | "styled" | "photos", or path_ and one of them
   int gap = 1;
-  int pairs = 0;                           // undefined ones included
-  int undefined_pairs = 0;                 // nothing to compare; in no mean
-  Metric tc_psnr_mean_db;                  // mean of the pairs' dB
-  Metric tc_psnr_of_mean_db;               // dB of the pairs' mean squared error
-  Metric tc_psnr_low_db, tc_psnr_high_db;  // 95 % interval of the mean of dB
+  int pairs = 0;                                   // undefined ones included
+  int undefined_pairs = 0;                         // nothing to compare; in no mean
+  Metric tc_psnr_mean_db;                          // mean of the pairs' dB
+  Metric tc_psnr_of_mean_db;                       // dB of the pairs' mean squared error
+  Metric tc_psnr_low_db, tc_psnr_high_db;          // 95 % interval of the mean of dB
   std::optional<double> tc_psnr_unmasked_mean_db;  // over all pixels that stay in the frame
   // Less the pairs of the first of several folders: mean, 95 % interval, number of pairs.
   std::optional<double> tc_psnr_difference_db, tc_psnr_difference_low_db,
       tc_psnr_difference_high_db;
   std::optional<int> difference_pairs;
   Metric coverage;                       // mean fraction of compared pixels
-  std::vector<Metric> tc_psnr_pairs_db;    // one for each pair in order of time
+  std::vector<Metric> tc_psnr_pairs_db;  // one for each pair in order of time
   std::string heat_map;  // picture of the worst pair, relative to the folder; may be empty
   std::optional<int> heat_map_from;  // first frame of that pair
 
@@ -121,7 +121,7 @@ struct WarpedMetrics {
   int gap = 1;
   int pairs = 0;
   Metric rmse_published, rmse;
-  std::optional<double> lpips_published, lpips;          // where a network was given
+  std::optional<double> lpips_published, lpips;  // where a network was given
   // Of `rmse`, as in ConsistencyMetrics.
   std::optional<double> rmse_difference, rmse_difference_low, rmse_difference_high;
   std::optional<int> difference_pairs;

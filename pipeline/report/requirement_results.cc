@@ -21,11 +21,11 @@ std::string BoundText(const Requirement& wanted) {
 // "measured 29.2, required at least 30", or why there is no number.
 std::string Outcome(const CheckedRequirement& requirement) {
   const Metric& measured = requirement.measured;
-  const std::string text = measured.value ? Format("measured %.6g", *measured.value)
-                           : requirement.holds
-                               ? "infinite, no error at all"
-                               : "no value" + (measured.why.empty() ? std::string()
-                                                                    : " (" + measured.why + ")");
+  const std::string text =
+      measured.value ? Format("measured %.6g", *measured.value)
+      : requirement.holds
+          ? "infinite, no error at all"
+          : "no value" + (measured.why.empty() ? std::string() : " (" + measured.why + ")");
   return text + ", required " + BoundText(requirement.wanted);
 }
 
@@ -36,12 +36,9 @@ std::string Attribute(const char* name, const std::string& value) {
 
 JsonValue ToJson(const CheckedRequirement& requirement) {
   const Requirement& wanted = requirement.wanted;
-  JsonValue json = JsonValue::Object{{"text", wanted.text},
-                                     {"subject", wanted.subject},
-                                     {"metric", wanted.metric},
-                                     {"bound", wanted.bound},
-                                     {"at_least", wanted.at_least},
-                                     {"holds", requirement.holds}};
+  JsonValue json = JsonValue::Object{
+      {"text", wanted.text},   {"subject", wanted.subject},   {"metric", wanted.metric},
+      {"bound", wanted.bound}, {"at_least", wanted.at_least}, {"holds", requirement.holds}};
   if (wanted.gap) json["gap"] = *wanted.gap;
   if (!requirement.of.empty()) json["style"] = requirement.of;
   PutMetric("measured", requirement.measured, &json);
@@ -57,8 +54,8 @@ std::string JUnitXml(const std::vector<CheckedRequirement>& requirements) {
                              Attribute("errors", "0");
   std::string xml = "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<testsuites" +
                     Attribute("name", "regrade") + counts + ">\n  <testsuite" +
-                    Attribute("name", "required metrics") + counts +
-                    Attribute("skipped", "0") + ">\n";
+                    Attribute("name", "required metrics") + counts + Attribute("skipped", "0") +
+                    ">\n";
   for (const CheckedRequirement& requirement : requirements) {
     const std::string& style = requirement.of;
     xml += "    <testcase" +

@@ -7,7 +7,8 @@
 namespace regrade {
 
 PaperTraits TraitsOf(const Capture& capture) {
-  return {ShowsThroughPhotos(capture), MeasureForwardFacing(WithParallax(capture)).on};
+  return {ShowsThroughPhotos(capture),
+          MeasureForwardFacing(WithParallax(capture, kLeastParallaxDeg)).on};
 }
 
 }  // namespace regrade

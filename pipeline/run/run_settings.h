@@ -75,8 +75,8 @@ struct FilmChoice {
   template <typename Bind>
   void Describe(Bind& bind) {
     bind("films", films,
-         {.help = "makes films, and measures the scene along their path; --no-films leaves both "
-                  "out, and what is measured at the photos' places stays"});
+         {.help = "makes films, and measures the scene along their path; --no-films does "
+                  "neither"});
   }
 };
 

@@ -186,8 +186,8 @@ std::vector<MissingControl> MissingControls(const RunSettings& settings, bool ma
   if (settings.object.On())
     missing.push_back({kLinearMapControl, "only a part of the scene is styled"});
   else if (!map_has_target)
-    missing.push_back({kLinearMapControl,
-                       "the 2D method styles no renders and the style is no picture"});
+    missing.push_back(
+        {kLinearMapControl, "the 2D method styles no renders and the style is no picture"});
   if (!same_camera)
     for (const char* name : {"photos", "photos_2d"})
       missing.push_back({name, "neighbouring photos differ in size or lens"});

@@ -125,9 +125,12 @@ StageOutcome FindPoses(RunContext* context, const CaptureSource& source,
     for (const std::string& note : notes) context->console->Info(note);
     said.insert(said.end(), notes.begin(), notes.end());
     metrics.given_poses = source.poses;
+    // Whether all photos of a small capture are enough is up to the fit.
+    PoseOptions minima = options;
+    minima.min_photos = std::min(minima.min_photos, static_cast<int>(ingest.photos.size()));
     // A run has already held its own poses to them.
     if (source.kind != CaptureKind::kPosed)
-      RequirePoses(capture, ingest.photos, options, source.poses);
+      RequirePoses(capture, ingest.photos, minima, source.poses);
     RequireSoundPoses(capture, source.poses);
   }
   metrics.notices = said;

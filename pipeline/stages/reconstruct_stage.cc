@@ -126,6 +126,17 @@ EffectReport ProfileViewDependence(const RunSettings& settings, const FitOptions
              "of the views"));
 }
 
+// Poses that were given may be fewer than COLMAP's must be.
+void RequireEnough(const Capture& capture, int least, const std::string& poses) {
+  const int64_t count = std::ssize(capture.views);
+  if (count < least)
+    throw SceneError(
+        Concat(Counted(count, "photo"), " with a pose, and a scene in 3D needs at least ",
+               least),
+        poses,
+        Concat("give poses of more photos; --pose-min-photos ", count, " tries with fewer"));
+}
+
 StageOutcome Reconstruct(RunContext* context, const JsonValue& inputs,
                          const ProgressFunction& progress) {
   const RunSettings& settings = context->settings;
@@ -133,6 +144,7 @@ StageOutcome Reconstruct(RunContext* context, const JsonValue& inputs,
   const WorkingViews as_taken(ReadCapture(workspace.Path("poses")), settings.scene.photo_size,
                               settings.run.holdout);
   const Capture& capture = as_taken.capture();
+  RequireEnough(capture, settings.pose.min_photos, workspace.Path("poses"));
   SceneProfile profile =
       ProfileScene(capture, settings.fit.sh_degree, settings.run.effects, settings.scene.box);
   const NormalizedScene& scene = profile.scene;

@@ -79,7 +79,7 @@ class Fitter {
       state.grid = InitialGrid();
       if (box_.background) state.grid.background = *box_.background;
       if (state.grid.num_voxels() == 0 ||
-          (options_.initial_views < 2 &&
+          (options_.initial_views < 2 && views_.size() > 1 &&
            !TwoViewsShareAPlace(rays_, state.grid.frame, box_.near_clip)))
         throw SceneError(
             Concat("no place is seen by ",

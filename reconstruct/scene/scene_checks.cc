@@ -55,13 +55,13 @@ double MedianTriangulationAngle(const Capture& capture) {
   return Median(TriangulationAngles(capture));
 }
 
-Capture WithParallax(const Capture& capture) {
+Capture WithParallax(const Capture& capture, double least_deg) {
   constexpr size_t kFewest = 50;
   const std::vector<double> angles = TriangulationAngles(capture);
   Capture sure = capture;
   sure.points.clear();
   for (size_t i = 0; i < angles.size(); ++i)
-    if (angles[i] >= kLeastParallaxDeg * M_PI / 180) sure.points.push_back(capture.points[i]);
+    if (angles[i] >= least_deg * M_PI / 180) sure.points.push_back(capture.points[i]);
   return sure.points.size() < std::max(kFewest, capture.points.size() / 10) ? capture : sure;
 }
 

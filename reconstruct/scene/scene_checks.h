@@ -14,10 +14,10 @@ std::vector<double> TriangulationAngles(const Capture& capture);
 // Their median; 0 without points.
 double MedianTriangulationAngle(const Capture& capture);
 
-// The capture without the points that are seen under less than kLeastParallaxDeg: their
-// distance is unknown, so they may lie thousands of times too far. Unchanged if that leaves
-// fewer than 50 points or a tenth of them, as of distant scenes.
-Capture WithParallax(const Capture& capture);
+// The capture without the points that are seen under less than `least_deg`: their distance is
+// unknown, so they may lie thousands of times too far. Unchanged if that leaves fewer than 50
+// points or a tenth of them, as of distant scenes.
+Capture WithParallax(const Capture& capture, double least_deg);
 // COLMAP's own limit, Mapper.filter_min_tri_angle, which points that it adds last escape.
 inline constexpr double kLeastParallaxDeg = 1.5;
 

@@ -100,7 +100,8 @@ TEST(FlowFolder, FilesAreFoundByTheirNumbers) {
   std::filesystem::create_directories(folder.path());
   WriteFlowFile(folder / "flow_7_8.flo", ConstantFlow(12, 12, 1, 0));
   WriteFlowFile(folder / "00008_00007.flo", ConstantFlow(12, 12, 2, 0));
-  WriteFlowFile(folder / "8_007.flo", ConstantFlow(12, 12, 3, 0));  // the exact name has precedence
+  WriteFlowFile(folder / "8_007.flo",
+                ConstantFlow(12, 12, 3, 0));  // the exact name has precedence
   WriteText(folder / "readme.txt", "");
   const FlowFolder flow(folder.path(), {7, 8});
   EXPECT_EQ(flow.LeastFrame(), 7);

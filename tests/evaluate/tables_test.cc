@@ -40,7 +40,8 @@ bool Has(const std::string& text, const std::string& part) {
 TEST(Tables, FormsForPasting) {
   const std::string markdown = FormatTables(SomeReport(), {}, {.form = "markdown"});
   EXPECT_TRUE(Has(markdown, "\n| sequence | gap | pairs |")) << markdown;
-  EXPECT_TRUE(Has(markdown, "| styled | 1 | 49 | 2 | 31.23 | [30.88, 31.50] | inf | 30.10 | 81.2 % |"));
+  EXPECT_TRUE(
+      Has(markdown, "| styled | 1 | 49 | 2 | 31.23 | [30.88, 31.50] | inf | 30.10 | 81.2 % |"));
   const std::string csv = FormatTables(SomeReport(), {}, {.form = "csv"});
   EXPECT_TRUE(Has(csv, "\nstyled,1,49,2,31.23,\"[30.88, 31.50]\",inf,30.10,81.2 %\n")) << csv;
   EXPECT_TRUE(Has(csv, "\n# styled, gap 5: no pair"));
@@ -99,10 +100,11 @@ TEST(Tables, LatexIsATableWithCaptionAndLabel) {
   EXPECT_TRUE(Has(latex, "\n\\label{tab:fidelity}\n")) << latex;
   // Interval and mean error have no value in any row.
   EXPECT_TRUE(Has(latex, "\\begin{tabular}{lrrrrrr}\n")) << latex;
-  EXPECT_TRUE(Has(latex,
-                  "\n{}[a]\\_\\{b\\} \\& \\textbackslash{}c\\textasciicircum{}"
-                  "\\textasciitilde{}\\textless{}50\\%\\textgreater{}\\textbar{} & 1 & 49 & 2 & "
-                  "$-$1.50 & 30.10 & "))
+  EXPECT_TRUE(
+      Has(latex,
+          "\n{}[a]\\_\\{b\\} \\& \\textbackslash{}c\\textasciicircum{}"
+          "\\textasciitilde{}\\textless{}50\\%\\textgreater{}\\textbar{} & 1 & 49 & 2 & "
+          "$-$1.50 & 30.10 & "))
       << latex;
   EXPECT_TRUE(Has(latex, "\n% control_linear_map: left out, no style\n")) << latex;
 }

@@ -17,8 +17,6 @@ const std::string& Token() {
 std::vector<std::string> RequestSeeds() {
   return {PlainRequest("GET", "/page", kPort, Token()), PlainRequest("GET", "/", kPort, ""),
           PlainRequest("POST", "/style", kPort, Token(), "Regrade-Name: a.png\r\n", "abc"),
-          PlainRequest("POST", "/style", kPort, Token(), "Transfer-Encoding: chunked\r\n") +
-              "3;x=y\r\nabc\r\n0\r\nX: y\r\n\r\n",
           PlainRequest("POST", "/style", kPort, Token(), "Expect: 100-continue\r\n", "abc") +
               PlainRequest("GET", "/page", kPort, Token())};
 }

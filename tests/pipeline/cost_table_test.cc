@@ -150,6 +150,7 @@ Capture Photos(int count) {
     view.camera.width = 400;
     view.camera.height = 300;
     view.camera.fx = view.camera.fy = 300;
+    view.camera.camera_from_world.translation.x = -i;  // each at a place of its own
     capture.views.push_back(view);
   }
   return capture;

@@ -1,5 +1,5 @@
-// `regrade evaluate --frames` with several folders: which frames belong together, by which motion
-// they are compared, and what is reported of requirements.
+// `regrade evaluate --frames` with several folders: which frames belong together, by which
+// motion they are compared, and what is reported of requirements.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -65,9 +65,9 @@ TEST(EvaluateFolders, FlowFilesBelongToTheirFrames) {
         WriteFlowFile(folder / (name + "/" + (back ? FlowFileName(b, a) : FlowFileName(a, b))),
                       flow);
       }
-    const Outcome outcome = Evaluate({"--frames", folder / "styled", "--reference",
-                                      folder / "source", "--gaps", "1", "--flow",
-                                      "files:" + (folder / name), "--out", folder / "out"});
+    const Outcome outcome =
+        Evaluate({"--frames", folder / "styled", "--reference", folder / "source", "--gaps",
+                  "1", "--flow", "files:" + (folder / name), "--out", folder / "out"});
     EXPECT_EQ(outcome.code, 0) << outcome.text;
     const JsonValue row = Row(ReadJsonFile(folder / "out/report.json"), "styled");
     EXPECT_EQ(row.At("undefined_pairs").AsInt(), 0);
@@ -86,9 +86,9 @@ TEST(EvaluateFolders, SeveralFoldersAreComparedPairByPair) {
   WriteFrames(folder / "a", 6, 0.01f);
   WriteFrames(folder / "b", 6, 0.03f);
   const auto evaluate = [&](const std::vector<std::string>& more) {
-    std::vector<std::string> words{"--frames", folder / "a",    folder / "b", "--reference",
-                                   folder / "source", "--gaps", "1",          "--out",
-                                   folder / "out"};
+    std::vector<std::string> words{"--frames",    folder / "a",      folder / "b",
+                                   "--reference", folder / "source", "--gaps",
+                                   "1",           "--out",           folder / "out"};
     words.insert(words.end(), more.begin(), more.end());
     return Evaluate(words);
   };
@@ -152,15 +152,16 @@ TEST(EvaluateFolders, MotionFromCamerasAndDepth) {
   synth.size = "64x48";
   WriteSyntheticCapture(folder / "s", synth);
   const auto evaluate = [&](const std::vector<std::string>& more, const std::string& out) {
-    std::vector<std::string> words{"--frames", folder / "s/images", "--reference",
-                                   folder / "s/images", "--out", folder / out};
+    std::vector<std::string> words{"--frames",    folder / "s/images",
+                                   "--reference", folder / "s/images",
+                                   "--out",       folder / out};
     words.insert(words.end(), more.begin(), more.end());
     return Evaluate(words);
   };
-  const Outcome exact = evaluate({"--protocol", "geometry", "--poses",
-                                  folder / "s/truth/transforms.json", "--depth",
-                                  folder / "s/truth/depth"},
-                                 "exact");
+  const Outcome exact =
+      evaluate({"--protocol", "geometry", "--poses", folder / "s/truth/transforms.json",
+                "--depth", folder / "s/truth/depth"},
+               "exact");
   ASSERT_EQ(exact.code, 0) << exact.text;
   const Outcome flow = evaluate({"--flow", "files:" + (folder / "s/truth/flow")}, "flow");
   ASSERT_EQ(flow.code, 0) << flow.text;
@@ -177,10 +178,10 @@ TEST(EvaluateFolders, MotionFromCamerasAndDepth) {
               Row(a, "styled", gap).At("tc_psnr_unmasked_mean_db").AsDouble() + 0.5);
   }
   std::filesystem::remove(folder / "s/truth/depth/00003.npy");
-  const Outcome missing = evaluate({"--mode", "geometry", "--poses",
-                                    folder / "s/truth/transforms.json", "--depth",
-                                    folder / "s/truth/depth"},
-                                   "missing");
+  const Outcome missing =
+      evaluate({"--mode", "geometry", "--poses", folder / "s/truth/transforms.json", "--depth",
+                folder / "s/truth/depth"},
+               "missing");
   EXPECT_EQ(missing.code, 3) << missing.text;
   EXPECT_OUTPUT(missing, "00003.png");
   EXPECT_EQ(evaluate({"--mode", "geometry"}, "none").code, 2);

@@ -26,9 +26,9 @@ using testing::WriteText;
 
 void WriteRun(const std::string& path, const JsonValue& options) {
   fs::create_directories(fs::path(path).parent_path());
-  WriteJsonFile(path, JsonValue::Object{{"schema", 2},
-                                        {"arguments", JsonValue::Array()},
-                                        {"options", options}});
+  WriteJsonFile(path,
+                JsonValue::Object{
+                    {"schema", 2}, {"arguments", JsonValue::Array()}, {"options", options}});
 }
 
 struct Resolved {
@@ -164,7 +164,8 @@ TEST(ForeignFolder, ValuesOfJsonNameTheirFile) {
   WriteText(folder / "a.json", "{\n\"a\": 1}");
   const JsonValue value = ReadJsonFile(folder / "a.json");
   EXPECT_REGRADE_ERROR(value.At("b"), ExitCode::kInput, (folder / "a.json") + ", line");
-  EXPECT_REGRADE_ERROR(value.At("a").AsString(), ExitCode::kInput, (folder / "a.json") + ", line 2");
+  EXPECT_REGRADE_ERROR(value.At("a").AsString(), ExitCode::kInput,
+                       (folder / "a.json") + ", line 2");
 }
 
 TEST(FolderIdentity, EndsWhereTheFolderIsMovedOrAnother) {
@@ -186,7 +187,8 @@ TEST(ChildProcess, HasATemporaryFolderOfItsOwnThatIsGoneAfterwards) {
   std::string own;
   for (const char* end : {"exit 0", "exit 1", "kill -9 $$"}) {
     ChildOptions options;
-    options.argv = {"/bin/sh", "-c", "touch $TMPDIR/x; stat -c '%a %n' $TMPDIR; " + std::string(end)};
+    options.argv = {"/bin/sh", "-c",
+                    "touch $TMPDIR/x; stat -c '%a %n' $TMPDIR; " + std::string(end)};
     options.temporary_parent = folder.path();
     RunChild(options, [&own](const std::string& line) { own = line; });
     EXPECT_TRUE(own.starts_with("700 " + folder.path() + "/")) << own;

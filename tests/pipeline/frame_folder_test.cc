@@ -121,7 +121,8 @@ TEST(FrameNumbers, AreTheDigitsThatDiffer) {
   EXPECT_EQ(Numbers({"cam1_08.png", "cam1_09.png", "cam2_01.png"}), List());
   EXPECT_EQ(Numbers({"left.png", "right.png"}), List());
   EXPECT_EQ(Numbers({"a1.png", "b2.png"}), List());
-  EXPECT_EQ(Numbers({"1403636579763555584.png", "1403636579813555456.png"}), List());  // too long
+  EXPECT_EQ(Numbers({"1403636579763555584.png", "1403636579813555456.png"}),
+            List());  // too long
 }
 
 // Two or more folders after pairing, the reference first.
@@ -162,8 +163,8 @@ TEST(FramePairing, ByNumberWhereNumbersOverlap) {
                 .names,
             (Names{"0.png", "2.png", "4.png"}));
   // The same numbers, whatever stands around them, are worth no notice.
-  const Paired same = PairOf(folder, {{"8.png", "9.png", "10.png"},
-                                      {"cam2_08.png", "cam2_09.png", "cam2_10.png"}});
+  const Paired same = PairOf(
+      folder, {{"8.png", "9.png", "10.png"}, {"cam2_08.png", "cam2_09.png", "cam2_10.png"}});
   EXPECT_EQ(same.pairings[0].by, "number");
   EXPECT_EQ(same.pairings[0].notice, "");
   EXPECT_EQ(same.folders[0].Source().count, 3);
@@ -172,8 +173,8 @@ TEST(FramePairing, ByNumberWhereNumbersOverlap) {
 TEST(FramePairing, ByNameOrInOrderWithANotice) {
   using Names = std::vector<std::string>;
   const TemporaryFolder folder;
-  const Paired names =
-      PairOf(folder, {{"left.png", "mid.png", "right.png"}, {"mid.jpg", "right.jpg", "top.jpg"}});
+  const Paired names = PairOf(
+      folder, {{"left.png", "mid.png", "right.png"}, {"mid.jpg", "right.jpg", "top.jpg"}});
   EXPECT_EQ(names.pairings[0].by, "name");
   EXPECT_EQ(names.folders[1].names, (Names{"mid.jpg", "right.jpg"}));
   EXPECT_EQ(names.pairings[0].left_out, Names{"top.jpg"});
@@ -193,18 +194,20 @@ TEST(FramePairing, AllFoldersHaveTheSameMoments) {
   const Paired three = PairOf(folder, {{"0.png", "1.png", "2.png", "3.png"},
                                        {"1.png", "2.png", "3.png"},
                                        {"0.png", "1.png", "2.png"}});
-  for (const FrameFolder& each : three.folders) EXPECT_EQ(each.names, (Names{"1.png", "2.png"}));
+  for (const FrameFolder& each : three.folders)
+    EXPECT_EQ(each.names, (Names{"1.png", "2.png"}));
 }
 
 TEST(FramePairing, WhatCannotBePairedIsNamed) {
   const TemporaryFolder folder;
   EXPECT_REGRADE_ERROR(PairOf(folder, {{"0.png", "1.png", "2.png"}, {"a.png", "b.png"}}),
                        ExitCode::kInput, "2 frames, the reference has 3");
-  EXPECT_REGRADE_ERROR(PairOf(folder, {{"a.png", "b.png", "c.png", "d.png"},
-                                       {"a.png", "b.png", "d.png"}}),
-                       ExitCode::kInput, "c.png of");
   EXPECT_REGRADE_ERROR(
-      PairOf(folder, {{"0.png", "1.png", "2.png", "3.png"}, {"0.png", "1.png"}, {"2.png", "3.png"}}),
+      PairOf(folder, {{"a.png", "b.png", "c.png", "d.png"}, {"a.png", "b.png", "d.png"}}),
+      ExitCode::kInput, "c.png of");
+  EXPECT_REGRADE_ERROR(
+      PairOf(folder,
+             {{"0.png", "1.png", "2.png", "3.png"}, {"0.png", "1.png"}, {"2.png", "3.png"}}),
       ExitCode::kInput, "no frame has a counterpart");
   FrameFolder reference = Open(folder / "wide", {"0.png", "1.png"}, 32),
               small = Open(folder / "small", {"0.png", "1.png"});

@@ -187,7 +187,8 @@ TEST(MixedSizes, H159_OneOfEachAndAPanorama) {
   CropPhoto(folder / "s", 0, 128, 96);
   CropPhoto(folder / "s", 1, 96, 96);
   CropPhoto(folder / "s", 2, 72, 96);
-  const ProgramOutcome done = Regrade(RunOf(folder / "s/truth", folder / "e"));
+  const ProgramOutcome done =
+      Regrade(RunOf(folder / "s/truth", folder / "e", {"--pose-min-photos", "4"}));
   ASSERT_EQ(done.code, 0) << done.text;
   EXPECT_EQ(SizeOf(folder / "e/styles/style_sunset/frames/source/00003.png"), "64x16");
   EXPECT_EQ(SizeOf(folder / "e/styles/style_sunset/frames/common_source/00003.png"), "64x48");
@@ -198,7 +199,8 @@ TEST(MixedSizes, H159_OneOfEachAndAPanorama) {
 TEST(MixedSizes, H159_FramesBelowTheFlowsPyramidHaveAReason) {
   const TemporaryFolder folder;
   ASSERT_EQ(Regrade({"synth", folder / "s", "--views", "4", "--size", "512x64"}).code, 0);
-  const ProgramOutcome done = Regrade(RunOf(folder / "s/truth", folder / "e"));
+  const ProgramOutcome done =
+      Regrade(RunOf(folder / "s/truth", folder / "e", {"--pose-min-photos", "4"}));
   ASSERT_EQ(done.code, 0) << done.text;
   EXPECT_EQ(SizeOf(folder / "e/styles/style_sunset/frames/source/00000.png"), "64x8");
   const JsonValue report = ReadJsonFile(folder / "e/styles/style_sunset/report.json");

@@ -277,7 +277,7 @@ TEST_F(NetworkProgram, StylesASceneWithFilesThatWerePutThere) {
   fs::create_directories(networks);
   for (const PublishedFile& file : FindNetwork("pca-kd").files)
     WriteFileAtomically(networks + "/" + file.name, Published(file.name));
-  ASSERT_EQ(Regrade({"synth", folder_ / "s", "--views", "4", "--size", "96x72"}).code, 0);
+  ASSERT_EQ(Regrade({"synth", folder_ / "s", "--views", "6", "--size", "96x72"}).code, 0);
   std::vector<std::string> arguments{
       "run",      folder_ / "s/truth",
       "--out",    folder_ / "out",

@@ -81,9 +81,7 @@ TEST(Requirements, WithoutANumberTheSentenceSaysWhatIsThere) {
   EXPECT_EQ(Failed("stylize:bound<=9")[0],
             "stylize:bound<=9: bound of stylize has no value (measured: reconstruct)");
   RunReport report;
-  const auto sentence = [&report](const char* text) {
-    return Failed(text, report, {1})[0];
-  };
+  const auto sentence = [&report](const char* text) { return Failed(text, report, {1})[0]; };
   EXPECT_EQ(sentence("styled:structure>=1"),
             "styled:structure>=1: structure of styled has no value (nothing was measured)");
   FidelityMetrics silent{.sequence = "styled"};
@@ -104,9 +102,7 @@ TEST(Requirements, FramesThatDoNotChangeAreAboveEveryBound) {
   still.rows = {row};
   RunReport report;
   report.evaluation = MetricsOf(still, {});
-  const auto failed = [&](const std::string& text) {
-    return Failed(text, report, {1});
-  };
+  const auto failed = [&](const std::string& text) { return Failed(text, report, {1}); };
   EXPECT_TRUE(failed("styled:tc-psnr:1>=30,styled:tc-psnr-of-mean:1>=30").empty());
   EXPECT_EQ(failed("styled:tc-psnr:1<=30").size(), 1u);
   // Without a pixel to compare there is no number, which holds no bound.
@@ -148,13 +144,14 @@ TEST(Requirements, FailWithAStatusOfTheirOwn) {
 // One test case for each requirement; names are data, not markup.
 TEST(Requirements, JUnitHasATestCaseForEach) {
   const testing::TemporaryFolder folder;
-  const auto requirements =
-      ParseRequirements("styled:tc-psnr:1>=30,styled:structure>=0.98,styled:tc-psnr:5>=1", {1, 5});
+  const auto requirements = ParseRequirements(
+      "styled:tc-psnr:1>=30,styled:structure>=0.98,styled:tc-psnr:5>=1", {1, 5});
   const auto checked = CheckRequirements(requirements, Report(), "a<b>&\"c\"\x01");
   const std::string xml = JUnitXml(checked);
   const auto count = [&](const std::string& part) {
     int found = 0;
-    for (size_t at = xml.find(part); at != std::string::npos; at = xml.find(part, at + 1)) ++found;
+    for (size_t at = xml.find(part); at != std::string::npos; at = xml.find(part, at + 1))
+      ++found;
     return found;
   };
   EXPECT_EQ(count("<testcase "), 3);

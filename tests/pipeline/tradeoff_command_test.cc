@@ -56,9 +56,9 @@ TEST(TradeoffCommand, MeasuresContinuesAndPredicts) {
   const std::string line = outcome.text.substr(said, outcome.text.find('\n', said) - said);
   const JsonValue budget = ParseJson(line, "stdout");
   EXPECT_GT(budget.At("base_seconds").AsDouble(), 0);
-  EXPECT_NEAR(
-      60 * budget.At("least_minutes").AsDouble(),
-      budget.At("base_seconds").AsDouble() + budget.At("first_seconds").AsDouble(), 1e-9);
+  EXPECT_NEAR(60 * budget.At("least_minutes").AsDouble(),
+              budget.At("base_seconds").AsDouble() + budget.At("first_seconds").AsDouble(),
+              1e-9);
 
   // With the base run there, the same budget is for one measurement.
   outcome = tradeoff({"--repeats", "1", "--budget", "1e-9"});

@@ -188,11 +188,11 @@ TEST(WithParallax, LeavesOutPointsOfUnknownDistance) {
   const size_t sound = capture.points.size();
   for (int i = 0; i < 20; ++i)
     capture.points.push_back({{1e4, 10.0 * i, 1e5}, {}, 0, {0, last}});
-  const Capture sure = WithParallax(capture);
+  const Capture sure = WithParallax(capture, kLeastParallaxDeg);
   EXPECT_EQ(sure.points.size(), sound);
   EXPECT_EQ(sure.views.size(), capture.views.size());
   const Capture distant = CaptureOf({.points = 200, .arc_deg = 1});
-  EXPECT_EQ(WithParallax(distant).points.size(), distant.points.size());
+  EXPECT_EQ(WithParallax(distant, kLeastParallaxDeg).points.size(), distant.points.size());
 }
 
 }  // namespace
