@@ -101,7 +101,7 @@ struct RenderOptions {
           .max = 3600});
     bind("film-size", film_size,
          {.unit = "pixels",
-          .help = "longer side of the film, at most that of the photos' files; not of --path "
+          .help = "longer side of the film, at most the photos'; not of --path "
                   "views",
           .min = 16,
           .max = 16384});
