@@ -27,16 +27,11 @@ struct StyleOptions {
   void Describe(Bind& bind) {
     bind("method", method,
          {.help =
-              "2D method that styles each view. mkl moves mean and covariance of the colours "
-              "onto the style's; gmm those of several groups of colours, each onto the groups "
-              "that suit it; reinhard mean and standard deviation of each CIELAB channel; idt "
-              "the whole distribution, the strongest change, which amplifies grain and soft "
-              "edges; histogram that of each channel; pca-kd runs networks of 302 kB, which "
-              "are fetched once, after a yes (--yes); onnx:DIR runs the networks of PCA-KD, "
-              "WCT, WCT2, CCPL or CAP-VSTNet in DIR (stylize/README.md); folder:DIR takes "
-              "photos that another program styled, by the photos' names, some may be missing; "
-              "command:\"PROGRAM {input} {style} {output}\" runs a program for each view, "
-              "without a shell",
+              "2D method that styles each view: mkl (mean and covariance of the colours), gmm "
+              "(the same for groups of colours), reinhard, idt (whole distribution; amplifies "
+              "grain), histogram, pca-kd (networks of 302 kB, fetched once after a yes), "
+              "onnx:DIR, folder:DIR (photos that another program styled), command:\"PROGRAM "
+              "{input} {style} {output}\" (run for each view); see stylize/README.md",
           .runs = "command:|onnx:",
           .reads = "folder:"});
     bind("scene-wide", scene_wide,
