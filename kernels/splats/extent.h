@@ -68,10 +68,8 @@ HD PixelBox ExtentOf(const SplatCamera& camera, const ScreenEllipse<T>& ellipse,
   const double radius = sqrt(static_cast<double>(reach)) * (1 + kExtentMargin) + kExtentMargin;
   PixelBox box;
   PixelsWithin(ellipse.u, radius * ellipse.c00, camera.width, &box.x0, &box.x1);
-  PixelsWithin(
-      ellipse.v,
-      radius * hypot(static_cast<double>(ellipse.c10), static_cast<double>(ellipse.c11)),
-      camera.height, &box.y0, &box.y1);
+  const double c10 = ellipse.c10, c11 = ellipse.c11;
+  PixelsWithin(ellipse.v, radius * hypot(c10, c11), camera.height, &box.y0, &box.y1);
   return box;
 }
 

@@ -32,6 +32,7 @@
 #pragma once
 
 #include <cmath>
+#include <type_traits>
 
 #include "kernels/base/vec.h"
 #include "kernels/splats/covariance.h"
@@ -47,6 +48,12 @@ inline constexpr double kMaxSlope = 1.3;   // of half the field of view
 template <typename T>
 HD T ScaledNorm(const Vec3<T>& v) {
   using std::abs, std::sqrt;
+#if !defined(__CUDA_ARCH__)
+  if constexpr (std::is_same_v<T, float>) {
+    const Vec3d wide = v.template Cast<double>();
+    return static_cast<float>(sqrt(Dot(wide, wide)));
+  }
+#endif
   T most = abs(v.x) > abs(v.y) ? abs(v.x) : abs(v.y);
   if (abs(v.z) > most) most = abs(v.z);
   if (!(most > 0)) return 0;
@@ -111,7 +118,7 @@ HD bool ProjectMean(const SplatCamera& camera, const SplatOptions& options, cons
 template <typename T>
 HD bool ProjectSplat(const SplatCamera& camera, const SplatOptions& options,
                      const Splat<T>& splat, SplatProjection<T>* p) {
-  using std::abs, std::hypot, std::sqrt;
+  using std::abs, std::sqrt;
   if (!ProjectMean(camera, options, splat.mean, p)) return false;
   const Mat3<T> rotation = camera.rotation.Cast<T>() * RotationOf(splat.quaternion);
   p->scale = ScalesOf(splat.log_scale);
@@ -132,7 +139,7 @@ HD bool ProjectSplat(const SplatCamera& camera, const SplatOptions& options,
     n[k] = p->area_by_slope[k] * Dot(p->t, p->axis[k]);
   }
   ScreenEllipse<T>* const e = &p->ellipse;
-  e->c00 = hypot(ScaledNorm(a[0]), root);
+  e->c00 = ScaledNorm(Vec3<T>{ScaledNorm(a[0]), root, T(0)});
   p->b[0] = a[0] / e->c00;
   e->c10 = Dot(p->b[0], a[1]);
   e->c11 = ScaledNorm(Vec3<T>{ScaledNorm(n) * most * (most / e->c00), root,

@@ -45,6 +45,15 @@ struct SplatSums {
   EllipseSums<T> ellipse;
   Vec3<T> color;  // sum w d_C
   T z = 0;        // sum w d_Z
+
+  template <typename U>
+  HD void Add(const SplatSums<U>& more) {
+    for (int a = 0; a < 2; ++a) ellipse.h[a] += more.ellipse.h[a];
+    for (int a = 0; a < 3; ++a) ellipse.H[a] += more.ellipse.H[a];
+    ellipse.f += more.ellipse.f;
+    color += more.color.template Cast<T>();
+    z += more.z;
+  }
 };
 
 // Adds to d and d_sh [3, basis] of the splat.

@@ -1,6 +1,6 @@
 #include "kernels/splats/cpu/splat_frame.h"
 
-#include <algorithm>
+#include <array>
 #include <cstring>
 #include <utility>
 
@@ -9,75 +9,115 @@
 namespace regrade {
 namespace {
 
-// Fills seen and box, front to back.
-void SeeInOrder(SplatFrame* frame) {
-  const int64_t n = frame->splats.count;
-  std::vector<SeenSplat<float>> seen(static_cast<size_t>(n));
-  std::vector<PixelBox> box(static_cast<size_t>(n));  // empty: not seen
-#pragma omp parallel for schedule(static)
-  for (int64_t i = 0; i < n; ++i) {
-    SeenSplat<float>& own = seen[static_cast<size_t>(i)];
-    if (SeeSplat(frame->camera, frame->options, frame->splats, i, &own))
-      box[static_cast<size_t>(i)] = ExtentOf(frame->camera, own.ellipse, own.reach);
-  }
-  // The bits of positive floats are in the floats' order; the lower half is the index.
-  std::vector<uint64_t> keys;
-  for (int64_t i = 0; i < n; ++i) {
-    if (box[static_cast<size_t>(i)].empty()) continue;
-    uint32_t bits;
-    std::memcpy(&bits, &seen[static_cast<size_t>(i)].z, sizeof bits);
-    keys.push_back(uint64_t{bits} << 32 | static_cast<uint64_t>(i));
-  }
-  std::sort(keys.begin(), keys.end());
-  frame->seen.reserve(keys.size());
-  frame->box.reserve(keys.size());
-  for (const uint64_t key : keys) {
-    frame->seen.push_back(seen[key & 0xFFFFFFFF]);
-    frame->box.push_back(box[key & 0xFFFFFFFF]);
-  }
-}
+struct Tiles {
+  int x0, y0, x1, y1;
+
+  // Of a box that is not empty.
+  explicit Tiles(const PixelBox& box)
+      : x0(box.x0 / kSplatTile),
+        y0(box.y0 / kSplatTile),
+        x1((box.x1 - 1) / kSplatTile + 1),
+        y1((box.y1 - 1) / kSplatTile + 1) {}
+  int64_t count() const { return int64_t{x1 - x0} * (y1 - y0); }
+};
 
 // Calls add(tile) for the tiles of a box, in their order.
 template <typename Add>
 void ForTiles(const SplatFrame& frame, const PixelBox& box, const Add& add) {
-  for (int y = box.y0 / kSplatTile; y <= (box.y1 - 1) / kSplatTile; ++y)
-    for (int x = box.x0 / kSplatTile; x <= (box.x1 - 1) / kSplatTile; ++x)
-      add(static_cast<size_t>(y * frame.tiles_x + x));
+  const Tiles tiles(box);
+  for (int y = tiles.y0; y < tiles.y1; ++y)
+    for (int x = tiles.x0; x < tiles.x1; ++x) add(static_cast<size_t>(y * frame.tiles_x + x));
+}
+
+// Fills seen and box, and the numbers of tiles in first_slot [1 .. splats].
+void SeeAll(SplatFrame* frame) {
+  const int64_t n = frame->splats.count;
+  frame->seen.resize(static_cast<size_t>(n));
+  frame->box.resize(static_cast<size_t>(n));
+  frame->first_slot.resize(static_cast<size_t>(n) + 1);
+  frame->first_slot[0] = 0;
+#pragma omp parallel for schedule(static)
+  for (int64_t i = 0; i < n; ++i) {
+    const size_t at = static_cast<size_t>(i);
+    PixelBox box;
+    if (SeeSplat(frame->camera, frame->options, frame->splats, i, &frame->seen[at]))
+      box = ExtentOf(frame->camera, frame->seen[at].ellipse, frame->seen[at].reach);
+    frame->box[at] = box;
+    frame->first_slot[at + 1] = box.empty() ? 0 : Tiles(box).count();
+  }
+}
+
+struct DepthKey {
+  uint32_t bits;  // of a positive float, in the floats' order
+  int32_t splat;
+};
+
+// The splats that are seen, front to back, then by index: a radix sort, which is stable.
+std::vector<DepthKey> ByDepth(const SplatFrame& frame) {
+  constexpr int kDigit = 11, kPasses = 3;
+  std::vector<DepthKey> keys;
+  keys.reserve(frame.seen.size());
+  std::array<std::vector<uint32_t>, kPasses> starts;
+  starts.fill(std::vector<uint32_t>((1 << kDigit) + 1));
+  const auto digit = [](uint32_t bits, int pass) {
+    return bits >> (pass * kDigit) & ((1u << kDigit) - 1);
+  };
+  for (size_t i = 0; i < frame.seen.size(); ++i) {
+    if (frame.box[i].empty()) continue;
+    DepthKey key{0, static_cast<int32_t>(i)};
+    std::memcpy(&key.bits, &frame.seen[i].z, sizeof key.bits);
+    for (int pass = 0; pass < kPasses; ++pass)
+      ++starts[static_cast<size_t>(pass)][digit(key.bits, pass) + 1];
+    keys.push_back(key);
+  }
+  std::vector<DepthKey> sorted(keys.size());
+  for (int pass = 0; pass < kPasses; ++pass) {
+    std::vector<uint32_t>& start = starts[static_cast<size_t>(pass)];
+    for (size_t d = 1; d < start.size(); ++d) start[d] += start[d - 1];
+    for (const DepthKey& key : keys) sorted[start[digit(key.bits, pass)]++] = key;
+    keys.swap(sorted);
+  }
+  return keys;
 }
 
 }  // namespace
 
-SplatFrame MakeSplatFrame(const SplatsView<float>& splats, const Camera& camera,
-                          const SplatOptions& options) {
+void MakeSplatFrame(const SplatsView<float>& splats, const Camera& camera,
+                    const SplatOptions& options, SplatFrame* frame) {
   REGRADE_CHECK(camera.lens == LensModel::kPinhole && !camera.ndc.on());
   REGRADE_CHECK(options.near_plane > 0 && options.blur > 0);
-  SplatFrame frame;
-  frame.splats = splats;
-  frame.camera = SplatCamera(camera);
-  frame.options = options;
-  frame.tiles_x = (camera.width + kSplatTile - 1) / kSplatTile;
-  frame.tiles_y = (camera.height + kSplatTile - 1) / kSplatTile;
-  SeeInOrder(&frame);
-  frame.first_slot.assign(1, 0);
-  frame.first_entry.assign(static_cast<size_t>(frame.num_tiles()) + 1, 0);
-  for (const PixelBox& box : frame.box) {
-    int64_t slots = frame.first_slot.back();
-    ForTiles(frame, box, [&](size_t tile) { ++slots, ++frame.first_entry[tile + 1]; });
-    frame.first_slot.push_back(slots);
+  frame->splats = splats;
+  frame->camera = SplatCamera(camera);
+  frame->options = options;
+  frame->tiles_x = (camera.width + kSplatTile - 1) / kSplatTile;
+  frame->tiles_y = (camera.height + kSplatTile - 1) / kSplatTile;
+  SeeAll(frame);
+  frame->first_entry.assign(static_cast<size_t>(frame->num_tiles()) + 1, 0);
+  for (size_t i = 0; i < frame->box.size(); ++i) {
+    frame->first_slot[i + 1] += frame->first_slot[i];
+    if (frame->box[i].empty()) continue;
+    ForTiles(*frame, frame->box[i], [&](size_t tile) { ++frame->first_entry[tile + 1]; });
   }
-  for (size_t tile = 0; tile + 1 < frame.first_entry.size(); ++tile)
-    frame.first_entry[tile + 1] += frame.first_entry[tile];
-  std::vector<int64_t> next(frame.first_entry.begin(), frame.first_entry.end() - 1);
-  frame.entry_splat.resize(static_cast<size_t>(frame.first_slot.back()));
-  frame.entry_slot.resize(frame.entry_splat.size());
-  for (size_t k = 0; k < frame.box.size(); ++k) {
-    int64_t slot = frame.first_slot[k];
-    ForTiles(frame, frame.box[k], [&](size_t tile) {
+  for (size_t tile = 0; tile + 1 < frame->first_entry.size(); ++tile)
+    frame->first_entry[tile + 1] += frame->first_entry[tile];
+  std::vector<int64_t> next(frame->first_entry.begin(), frame->first_entry.end() - 1);
+  frame->entry_splat.resize(static_cast<size_t>(frame->first_slot.back()));
+  frame->entry_slot.resize(frame->entry_splat.size());
+  for (const DepthKey& key : ByDepth(*frame)) {
+    const size_t i = static_cast<size_t>(key.splat);
+    int64_t slot = frame->first_slot[i];
+    ForTiles(*frame, frame->box[i], [&](size_t tile) {
       const size_t entry = static_cast<size_t>(next[tile]++);
-      frame.entry_splat[entry] = static_cast<int32_t>(k);
-      frame.entry_slot[entry] = slot++;
+      frame->entry_splat[entry] = key.splat;
+      frame->entry_slot[entry] = slot++;
     });
   }
+}
+
+SplatFrame MakeSplatFrame(const SplatsView<float>& splats, const Camera& camera,
+                          const SplatOptions& options) {
+  SplatFrame frame;
+  MakeSplatFrame(splats, camera, options, &frame);
   return frame;
 }
 

@@ -1,0 +1,147 @@
+// One optimizer step of a splat, the same body on both processors.
+//
+// EQ(splat-adam): Adam (EQ(adam), epsilon 1e-15) on every value of a splat, with a rate for each
+// attribute, on the gradient of the picture's loss and of EQ(splat-regularizers), Kheradmand et
+// al. 2024, eq. 10:  lambda_o mean sigmoid(x_i) + lambda_s mean exp(l_ik)  over all splats.
+//
+// EQ(splat-noise), Kheradmand et al. 2024, eq. 8: after the step, with the covariance Sigma of
+// EQ(splat-covariance) and n ~ N(0, 1)^3,
+//   mean += noise Sigma n / (1 + exp(100 (o - 0.005))),
+// which explores with splats that are nearly transparent, along their own extent, and leaves
+// others: beyond o = 0.25, where the factor is below 1e-10, nothing is added.
+#pragma once
+
+#include <cmath>
+#include <cstdint>
+
+#include "kernels/base/random.h"
+#include "kernels/base/random_streams.h"
+#include "kernels/optimize/adam.h"
+#include "kernels/splats/covariance.h"
+#include "kernels/splats/extent.h"
+#include "kernels/splats/splats.h"
+
+namespace regrade {
+
+inline constexpr float kDeadOpacity = 0.005f;  // below it, a splat is moved elsewhere
+inline constexpr float kNoiseOpacity = 0.25f;  // from it on, none is added
+
+struct SplatRates {
+  float mean = 0;  // world units
+  float log_scale = 0, quaternion = 0, opacity_logit = 0;
+  float sh_mean = 0, sh_rest = 0;  // of degree 0, and of the others
+};
+
+struct SplatUpdate {
+  SplatRates rates;
+  float opacity_weight = 0, scale_weight = 0;  // the lambdas over the numbers of values
+  float noise = 0;                             // of EQ(splat-noise)
+  uint64_t seed = 0, step = 0;                 // steps before this one
+  // Of Adam, for this step: see AdamUpdate.
+  float beta1 = 0.9f, beta2 = 0.999f, epsilon = 1e-15f;
+  float inverse_correction1 = 1, inverse_correction2 = 1;
+
+  void SetStep(uint64_t number) {
+    step = number;
+    const int64_t t = static_cast<int64_t>(number) + 1;
+    inverse_correction1 = static_cast<float>(1 / AdamBiasCorrection(double{beta1}, t));
+    inverse_correction2 = static_cast<float>(1 / AdamBiasCorrection(double{beta2}, t));
+  }
+};
+
+// The arrays of splats, or of a moment of their gradients, for writing; see SplatsView.
+struct SplatPointers {
+  float *mean, *log_scale, *quaternion, *opacity_logit, *sh;
+};
+struct SplatMoments {
+  SplatPointers value, first, second;
+};
+
+// n ~ N(0, 1), three of them for splat i: Box and Muller on numbers by counter.
+HD inline Vec3f SplatNoise(uint64_t seed, uint64_t step, int64_t i) {
+  using std::cos, std::log, std::sin, std::sqrt;
+  float uniform[4];
+  for (uint64_t k = 0; k < 2; ++k) {
+    const uint64_t bits =
+        RandomBits(seed ^ kRandomSplatNoise, step, 2 * static_cast<uint64_t>(i) + k);
+    // In (0, 1): half a step above multiples of 2^-24.
+    uniform[2 * k] = (static_cast<float>(bits >> 40) + 0.5f) * 0x1p-24f;
+    uniform[2 * k + 1] = static_cast<float>((bits >> 8) & 0xFFFFFF) * 0x1p-24f;
+  }
+  constexpr float kTurn = 6.28318531f;
+  const float near = sqrt(-2 * log(uniform[0])), far = sqrt(-2 * log(uniform[2]));
+  return {near * cos(kTurn * uniform[1]), near * sin(kTurn * uniform[1]),
+          far * cos(kTurn * uniform[3])};
+}
+
+HD inline void AddSplatNoise(const SplatUpdate& update, int64_t i, const Splat<float>& splat,
+                             float* mean) {
+  using std::exp;
+  const float opacity = exp(LogSigmoid(splat.opacity_logit));
+  if (!(update.noise > 0) || !(opacity < kNoiseOpacity)) return;
+  const float share = 1 / (1 + exp(100 * (opacity - kDeadOpacity)));
+  const Mat3f rotation = RotationOf(splat.quaternion);
+  const Vec3f scale = ScalesOf(splat.log_scale);
+  Vec3f along = rotation.Transposed() * SplatNoise(update.seed, update.step, i);
+  for (int a = 0; a < 3; ++a) along[a] *= scale[a] * scale[a];
+  const Vec3f offset = rotation * along * (update.noise * share);
+  for (int a = 0; a < 3; ++a) mean[a] += offset[a];
+}
+
+// Steps splat i by the gradient d, d_sh [3, basis] of the picture's loss. A gradient that is not
+// finite, or whose square is not, changes nothing of the splat, and the result is false.
+HD inline bool UpdateSplat(const SplatUpdate& update, int64_t i, int basis,
+                           const Splat<float>& d, const float* d_sh, const SplatMoments& to) {
+  using std::abs, std::exp;
+  float sum = abs(d.opacity_logit);
+  for (int a = 0; a < 3; ++a) sum += abs(d.mean[a]) + abs(d.log_scale[a]);
+  for (int a = 0; a < 4; ++a) sum += abs(d.quaternion[a]);
+  for (int k = 0; k < 3 * basis; ++k) sum += abs(d_sh[k]);
+  if (!(sum < kLargestGradient)) return false;
+  const auto step = [&](float gradient, float rate, float* value, float* first, float* second) {
+    AdamUpdate(gradient, update.beta1, update.beta2, update.epsilon,
+               rate * update.inverse_correction1, update.inverse_correction2, value, first,
+               second);
+  };
+  const SplatRates& rates = update.rates;
+  const float logit = to.value.opacity_logit[i];
+  const float opacity = exp(LogSigmoid(logit));
+  step(d.opacity_logit + update.opacity_weight * opacity * (1 - opacity), rates.opacity_logit,
+       &to.value.opacity_logit[i], &to.first.opacity_logit[i], &to.second.opacity_logit[i]);
+  for (int64_t k = 3 * i; k < 3 * i + 3; ++k) {
+    const int a = static_cast<int>(k - 3 * i);
+    const float log_scale = to.value.log_scale[k];
+    const float scale = exp(log_scale < 20.0f ? log_scale : 20.0f) * LogScaleCounts(log_scale);
+    step(d.mean[a], rates.mean, &to.value.mean[k], &to.first.mean[k], &to.second.mean[k]);
+    step(d.log_scale[a] + update.scale_weight * scale, rates.log_scale, &to.value.log_scale[k],
+         &to.first.log_scale[k], &to.second.log_scale[k]);
+  }
+  for (int64_t k = 4 * i; k < 4 * i + 4; ++k)
+    step(d.quaternion[k - 4 * i], rates.quaternion, &to.value.quaternion[k],
+         &to.first.quaternion[k], &to.second.quaternion[k]);
+  for (int c = 0; c < 3; ++c) {
+    const int64_t k = (3 * i + c) * basis;
+    float *value = to.value.sh + k, *first = to.first.sh + k, *second = to.second.sh + k;
+    step(d_sh[c * basis], rates.sh_mean, value, first, second);
+#if !defined(__CUDA_ARCH__)
+#pragma omp simd
+#endif
+    for (int b = 1; b < basis; ++b)
+      step(d_sh[c * basis + b], rates.sh_rest, value + b, first + b, second + b);
+  }
+  const Splat<float> splat = {
+      {to.value.mean[3 * i], to.value.mean[3 * i + 1], to.value.mean[3 * i + 2]},
+      {to.value.log_scale[3 * i], to.value.log_scale[3 * i + 1], to.value.log_scale[3 * i + 2]},
+      {to.value.quaternion[4 * i], to.value.quaternion[4 * i + 1],
+       to.value.quaternion[4 * i + 2], to.value.quaternion[4 * i + 3]},
+      to.value.opacity_logit[i]};
+  AddSplatNoise(update, i, splat, &to.value.mean[3 * i]);
+  return true;
+}
+
+inline SplatPointers PointersOf(SplatArrays<float>* splats) {
+  return {splats->mean.data(), splats->log_scale.data(), splats->quaternion.data(),
+          splats->opacity_logit.data(), splats->sh.data()};
+}
+
+}  // namespace regrade

@@ -1,0 +1,234 @@
+#include "reconstruct/splats/fit_splats.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <numeric>
+#include <optional>
+#include <string>
+
+#include "kernels/base/clock.h"
+#include "kernels/base/error.h"
+#include "kernels/base/random.h"
+#include "kernels/base/random_streams.h"
+#include "kernels/field/spherical_harmonics.h"
+#include "reconstruct/splats/initial_splats.h"
+#include "reconstruct/splats/splat_engine.h"
+
+namespace regrade {
+namespace {
+
+double Psnr(double error, int64_t values) {
+  return -10 * std::log10(error / static_cast<double>(std::max<int64_t>(values, 1)));
+}
+
+class SplatFitter {
+ public:
+  SplatFitter(const std::vector<TrainingView>& views, const SceneBox& box,
+              const SplatFitOptions& options, const SplatFitHooks& hooks, Backend backend)
+      : views_(views), box_(box), options_(options), hooks_(hooks), photos_(views) {
+    const SplatOptions render = SplatOptionsFor(box, options.antialiased);
+    engine_ = backend == Backend::kCuda ? MakeCudaSplatEngine(render)
+                                        : MakeCpuSplatEngine(render);
+    extent_ = static_cast<float>(SceneExtent(photos_, box));
+    most_ = static_cast<int64_t>(options.thousands * 1000);
+  }
+
+  SplatFitResult Run() {
+    SplatFitState state;
+    if (hooks_.resume != nullptr) {
+      state = std::move(*hooks_.resume);
+    } else {
+      state.splats = InitialSplats(views_, photos_, box_, options_);
+      if (box_.background) state.splats.background = *box_.background;
+      state.first_moment = Splats(state.splats.count(), 1);
+      state.second_moment = state.first_moment;
+    }
+    step_ = state.step;
+    tally_ = std::move(state.tally);
+    engine_->SetState(std::move(state));
+    start_ = last_checkpoint_ = ClockSeconds();
+    ChoosePhotos();
+    while (step_ < options_.steps) {
+      Step();
+      if (hooks_.measure_each > 0 && step_ % hooks_.measure_each == 0 && step_ < options_.steps)
+        Measure();
+      if (Report(hooks_.progress, step_, options_.steps, note_) == LoopControl::kStop) {
+        SaveCheckpoint();
+        throw Interrupted();
+      }
+      if (ClockSeconds() - last_checkpoint_ > kCheckpointSeconds) SaveCheckpoint();
+    }
+    CloseWindow();
+    SplatFitResult result;
+    result.seconds = ClockSeconds() - start_ - idle_;
+    Measure();
+    engine_->ReadState([&](SplatFitState* end) { result.splats = end->splats; });
+    result.psnr_train_db = Psnr(tally_.tail_error, tally_.tail_values);
+    result.rejected = tally_.rejected;
+    result.curve = std::move(tally_.curve);
+    return result;
+  }
+
+ private:
+  int At(float part) const {
+    return static_cast<int>(std::lround(part * static_cast<float>(options_.steps)));
+  }
+
+  // Half the photos' size at first.
+  void ChoosePhotos() {
+    const bool small = step_ < At(options_.small_until);
+    if (small && !small_) small_.emplace(views_, 2);
+    if (!small) small_.reset();
+    engine_->SetPhotos(small ? &*small_ : &photos_);
+  }
+
+  // Each photo once in a round, in an order of its own.
+  int PhotoOfStep() {
+    const int n = photos_.count(), round = step_ / n;
+    if (round != round_) {
+      round_ = round;
+      order_.resize(static_cast<size_t>(n));
+      std::iota(order_.begin(), order_.end(), 0);
+      for (int k = n - 1; k > 0; --k)
+        std::swap(order_[static_cast<size_t>(k)],
+                  order_[RandomIndex(options_.seed ^ kRandomSplatViews,
+                                     static_cast<uint64_t>(round), static_cast<uint64_t>(k),
+                                     static_cast<uint64_t>(k) + 1)]);
+    }
+    return order_[static_cast<size_t>(step_ % n)];
+  }
+
+  void Step() {
+    if (step_ == At(options_.small_until) && step_ > 0) ChoosePhotos();
+    Populate();
+    const int degree = std::min(
+        options_.sh_degree, step_ / std::max(1, At(options_.degree_each)));
+    if (BasisOfDegree(degree) > engine_->basis()) engine_->SetBasis(BasisOfDegree(degree));
+    SplatStep step;
+    step.photo = PhotoOfStep();
+    step.ssim_weight = options_.ssim_weight;
+    SplatUpdate& update = step.update;
+    const float part = static_cast<float>(step_) / static_cast<float>(options_.steps);
+    const float rate = options_.rate_mean *
+                       std::pow(options_.rate_mean_end / options_.rate_mean, part) * extent_;
+    update.rates = {rate,
+                    options_.rate_scale,
+                    options_.rate_quaternion,
+                    options_.rate_opacity,
+                    options_.rate_color,
+                    options_.rate_view};
+    update.noise = options_.noise * rate;
+    const float splats = static_cast<float>(engine_->count());
+    update.opacity_weight = options_.opacity_weight / splats;
+    update.scale_weight = options_.scale_weight / (3 * splats);
+    update.seed = options_.seed;
+    update.SetStep(static_cast<uint64_t>(step_));
+    engine_->Step(step);
+    ++step_;
+    if (step_ % kWindow == 0) CloseWindow();
+  }
+
+  // Moves dead splats and adds new ones, every `grow_each`.
+  void Populate() {
+    const int each = std::max(1, At(options_.grow_each));
+    if (step_ % each != 0 || step_ < At(options_.grow_from) || step_ == 0 ||
+        step_ >= At(options_.grow_until))
+      return;
+    const uint64_t number = static_cast<uint64_t>(step_);
+    std::vector<float> logits = engine_->OpacityLogits();
+    const PopulationChange moved = MoveDead(logits, options_.seed, number);
+    if (!moved.copies.empty()) engine_->Change(moved);
+    const int64_t now = engine_->count();
+    const int64_t more =
+        std::min(most_, static_cast<int64_t>((1 + options_.growth) * static_cast<float>(now))) -
+        now;
+    if (more <= 0) return;
+    for (const CopiedSplat& copied : moved.copied)
+      logits[static_cast<size_t>(copied.index)] = copied.opacity_logit;
+    for (const SplatCopy& copy : moved.copies)
+      logits[static_cast<size_t>(copy.to)] = logits[static_cast<size_t>(copy.from)];
+    engine_->Change(Grow(logits, more, options_.seed, number));
+  }
+
+  void CloseWindow() {
+    TakeSums();
+    if (tally_.window_values == 0) return;
+    if (step_ > options_.steps - options_.steps / 10) {
+      tally_.tail_error += tally_.window_error;
+      tally_.tail_values += tally_.window_values;
+    }
+    const double psnr = Psnr(tally_.window_error, tally_.window_values);
+    tally_.curve.push_back({step_, ClockSeconds() - start_ - idle_, psnr, engine_->count()});
+    char text[96];
+    std::snprintf(text, sizeof text, "%.0f k splats, %.2f dB on training photos",
+                  static_cast<double>(engine_->count()) * 1e-3, psnr);
+    note_ = text;
+    tally_.window_error = 0;
+    tally_.window_values = 0;
+  }
+
+  void TakeSums() {
+    const SplatFitSums sums = engine_->TakeSums();
+    tally_.window_error += sums.picture.squared;
+    tally_.window_values += sums.picture.values;
+    tally_.pairs += sums.pairs;
+    tally_.rejected += sums.rejected;
+  }
+
+  void SaveCheckpoint() {
+    const double begin = ClockSeconds();
+    if (hooks_.checkpoint) {
+      TakeSums();
+      engine_->ReadState([this](SplatFitState* state) {
+        state->step = step_;
+        state->tally = tally_;
+        hooks_.checkpoint(*state);
+      });
+    }
+    last_checkpoint_ = ClockSeconds();
+    idle_ += last_checkpoint_ - begin;
+  }
+
+  void Measure() {
+    const double begin = ClockSeconds();
+    if (hooks_.measure) hooks_.measure(engine_.get());
+    idle_ += ClockSeconds() - begin;
+  }
+
+  static constexpr int kWindow = 50;  // steps
+  static constexpr double kCheckpointSeconds = 60;
+
+  const std::vector<TrainingView>& views_;
+  SceneBox box_;
+  SplatFitOptions options_;
+  SplatFitHooks hooks_;
+  SplatPhotos photos_;
+  std::optional<SplatPhotos> small_;
+  std::unique_ptr<SplatEngine> engine_;
+  float extent_ = 1;
+  int64_t most_ = 0;
+  int step_ = 0, round_ = -1;
+  std::vector<int> order_;
+  SplatFitTally tally_;
+  double start_ = 0, last_checkpoint_ = 0, idle_ = 0;
+  std::string note_;
+};
+
+}  // namespace
+
+SplatOptions SplatOptionsFor(const SceneBox& box, bool antialiased) {
+  SplatOptions options;
+  const double longest = std::max({box.radius.x, box.radius.y, box.radius.z});
+  options.near_plane = std::max(0.5 * box.near_clip, 1e-3 * longest);
+  options.antialiased = antialiased;
+  return options;
+}
+
+SplatFitResult FitSplats(const std::vector<TrainingView>& views, const SceneBox& box,
+                         const SplatFitOptions& options, const SplatFitHooks& hooks,
+                         Backend backend) {
+  return SplatFitter(views, box, options, hooks, backend).Run();
+}
+
+}  // namespace regrade

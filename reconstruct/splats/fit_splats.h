@@ -1,0 +1,68 @@
+// Fits splats to posed photos: Adam on whole photos, with a population that moves and grows, as
+// Kheradmand et al. 2024 (3D Gaussian Splatting as Markov Chain Monte Carlo).
+#pragma once
+
+#include <functional>
+#include <vector>
+
+#include "kernels/base/progress.h"
+#include "kernels/device/backend.h"
+#include "kernels/splats/splat_camera.h"
+#include "kernels/splats/splats.h"
+#include "reconstruct/fit/training_rays.h"
+#include "reconstruct/scene/scene_box.h"
+#include "reconstruct/splats/splat_fit_options.h"
+
+namespace regrade {
+
+struct SplatCurvePoint {
+  int64_t step = 0;  // done
+  double seconds = 0;
+  double psnr_train_db = 0;  // over the steps since the last point
+  int64_t splats = 0;
+};
+
+// Running sums of a fit: window_* since the last point of the curve, tail_* over the last tenth.
+struct SplatFitTally {
+  double window_error = 0, tail_error = 0;
+  int64_t window_values = 0, tail_values = 0;
+  int64_t pairs = 0, rejected = 0;
+  std::vector<SplatCurvePoint> curve;
+};
+
+// Everything needed to resume a fit with the same result as without a stop.
+struct SplatFitState {
+  Splats splats, first_moment, second_moment;
+  int step = 0;
+  SplatFitTally tally;
+};
+
+struct SplatFitResult {
+  Splats splats;
+  double psnr_train_db = 0;
+  int64_t rejected = 0;
+  double seconds = 0;  // of this call, without checkpoints
+  std::vector<SplatCurvePoint> curve;
+};
+
+class SplatEngine;
+
+struct SplatFitHooks {
+  ProgressFunction progress;
+  // Called at the end, and at `measure_each` steps if that is not 0.
+  std::function<void(SplatEngine*)> measure;
+  int measure_each = 0;
+  SplatFitState* resume = nullptr;  // moved from
+  std::function<void(const SplatFitState&)> checkpoint;
+};
+
+// Of the field's pictures, fitted and later ones: the near plane is half of the near clip.
+SplatOptions SplatOptionsFor(const SceneBox& box, bool antialiased);
+
+// Throws Error(kScene) if no place of the box is seen by two photos, Interrupted after kStop
+// (after calling `checkpoint`).
+SplatFitResult FitSplats(const std::vector<TrainingView>& views, const SceneBox& box,
+                         const SplatFitOptions& options, const SplatFitHooks& hooks,
+                         Backend backend = Backend::kCpu);
+
+}  // namespace regrade

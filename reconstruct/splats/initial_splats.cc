@@ -1,0 +1,145 @@
+#include "reconstruct/splats/initial_splats.h"
+
+#include <algorithm>
+#include <array>
+#include <boost/geometry.hpp>
+#include <boost/geometry/geometries/point.hpp>
+#include <boost/geometry/index/rtree.hpp>
+#include <cmath>
+#include <map>
+
+#include "kernels/base/error.h"
+#include "kernels/base/random.h"
+#include "kernels/base/random_streams.h"
+#include "kernels/field/spherical_harmonics.h"
+
+namespace regrade {
+namespace {
+
+struct Start {
+  Vec3f place;
+  Vec3f color;
+};
+
+// Sums the colours of the pixels that show a place.
+struct ColorSum {
+  Vec3d sum;
+  int count = 0;
+
+  void Add(const SplatPhoto& photo, const Vec3f& place) {
+    double u, v;
+    const Camera& camera = photo.camera;
+    if (!camera.Project(place.Cast<double>(), &u, &v)) return;
+    if (!(u >= 0 && v >= 0 && u < camera.width && v < camera.height)) return;
+    const size_t pixel = static_cast<size_t>(v) * camera.width + static_cast<size_t>(u);
+    if (!photo.masked.empty() && photo.masked[pixel] != 0) return;
+    for (int c = 0; c < 3; ++c) sum[c] += photo.color[3 * pixel + c] / 65535.0;
+    ++count;
+  }
+  Vec3f Mean() const { return (sum / std::max(count, 1)).Cast<float>(); }
+};
+
+std::vector<Start> StartsAtPoints(const std::vector<TrainingView>& views,
+                                  const SplatPhotos& photos) {
+  std::map<std::array<float, 3>, ColorSum> seen;
+  for (int v = 0; v < photos.count(); ++v)
+    for (const SeenPoint& point : views[static_cast<size_t>(v)].points) {
+      const Vec3f& p = point.position;
+      seen[{p.x, p.y, p.z}].Add(photos[v], p);
+    }
+  std::vector<Start> starts;
+  for (const auto& [place, color] : seen)
+    if (color.count > 0) starts.push_back({{place[0], place[1], place[2]}, color.Mean()});
+  return starts;
+}
+
+// Adds random places of the box that two photos see, up to `count` starts.
+void AddRandomStarts(const SplatPhotos& photos, const SceneBox& box, uint64_t seed, size_t count,
+                     std::vector<Start>* starts) {
+  constexpr uint64_t kTries = 20;
+  const int least = std::min(2, photos.count());
+  const uint64_t tries = kTries * count;
+  for (uint64_t i = 0; i < tries && starts->size() < count; ++i) {
+    Vec3f place;
+    for (uint64_t a = 0; a < 3; ++a)
+      place[static_cast<int>(a)] =
+          box.center[static_cast<int>(a)] +
+          box.radius[static_cast<int>(a)] *
+              static_cast<float>(2 * RandomDouble(seed ^ kRandomSplatPlaces, a, i) - 1);
+    ColorSum color;
+    for (int v = 0; v < photos.count(); ++v) color.Add(photos[v], place);
+    if (color.count >= least) starts->push_back({place, color.Mean()});
+  }
+}
+
+// Root mean square of the distances to the three nearest others.
+std::vector<double> Spacings(const std::vector<Start>& starts) {
+  namespace bg = boost::geometry;
+  using Point = bg::model::point<double, 3, bg::cs::cartesian>;
+  using Entry = std::pair<Point, size_t>;
+  std::vector<Entry> entries;
+  for (size_t i = 0; i < starts.size(); ++i) {
+    const Vec3f& p = starts[i].place;
+    entries.push_back({Point(p.x, p.y, p.z), i});
+  }
+  const bg::index::rtree<Entry, bg::index::rstar<16>> tree(entries);
+  std::vector<double> spacings(starts.size());
+#pragma omp parallel for schedule(dynamic, 64)
+  for (size_t i = 0; i < entries.size(); ++i) {
+    std::vector<Entry> near;
+    tree.query(bg::index::nearest(entries[i].first, 4), std::back_inserter(near));
+    double square = 0;
+    for (const Entry& entry : near)
+      square += bg::comparable_distance(entry.first, entries[i].first);
+    spacings[i] =
+        std::sqrt(square / static_cast<double>(std::max<size_t>(1, near.size() - 1)));
+  }
+  return spacings;
+}
+
+}  // namespace
+
+Splats InitialSplats(const std::vector<TrainingView>& views, const SplatPhotos& photos,
+                     const SceneBox& box, const SplatFitOptions& options) {
+  std::vector<Start> starts = StartsAtPoints(views, photos);
+  const size_t most = static_cast<size_t>(options.thousands * 1000);
+  AddRandomStarts(photos, box, options.seed, std::min<size_t>(kFewPoints, most), &starts);
+  if (starts.empty())
+    throw SceneError(Concat("no place is seen by two of the ", photos.count(),
+                            " photos that are fitted: wrong poses, or too few"),
+                     "reconstruct",
+                     "check the poses against the photos, or give more photos that overlap by "
+                     "two thirds");
+  if (starts.size() > most) {  // evenly
+    std::vector<Start> fewer;
+    for (size_t k = 0; k < most; ++k) fewer.push_back(starts[k * starts.size() / most]);
+    starts = std::move(fewer);
+  }
+  const std::vector<double> spacings = Spacings(starts);
+  const double longest = std::max({box.radius.x, box.radius.y, box.radius.z});
+  Splats splats(std::ssize(starts), 1);
+  const float logit = std::log(options.initial_opacity / (1 - options.initial_opacity));
+  for (size_t i = 0; i < starts.size(); ++i) {
+    const double scale = std::max(options.initial_scale * spacings[i], 1e-7 * longest);
+    const float log_scale = static_cast<float>(std::log(scale));
+    splats.Set(static_cast<int64_t>(i),
+               {starts[i].place, {log_scale, log_scale, log_scale}, {1, 0, 0, 0}, logit});
+    for (int c = 0; c < 3; ++c)
+      splats.sh[3 * i + static_cast<size_t>(c)] =
+          (starts[i].color[c] - 0.5f) / static_cast<float>(kSh0);
+  }
+  return splats;
+}
+
+double SceneExtent(const SplatPhotos& photos, const SceneBox& box) {
+  Vec3d mean{};
+  for (int v = 0; v < photos.count(); ++v) mean += photos[v].camera.Center();
+  mean = mean / photos.count();
+  double farthest = 0;
+  for (int v = 0; v < photos.count(); ++v)
+    farthest = std::max(farthest, Norm(photos[v].camera.Center() - mean));
+  const double longest = std::max({box.radius.x, box.radius.y, box.radius.z});
+  return std::max(1.1 * farthest, 0.01 * longest);
+}
+
+}  // namespace regrade

@@ -1,0 +1,35 @@
+// How splats multiply and move during a fit, Kheradmand et al. 2024, section 3.3: dead ones go
+// to places drawn by opacity, and new ones begin there. What is drawn depends on opacities, seed
+// and step alone.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+namespace regrade {
+
+// A splat that is copied: it and its copies get this opacity, and its scales times this factor.
+struct CopiedSplat {
+  int32_t index;
+  float opacity_logit, log_factor;
+};
+struct SplatCopy {
+  int32_t from, to;
+};
+
+// First the copied ones change, then the copies are made, whose moments, as those of the copied
+// ones, become 0.
+struct PopulationChange {
+  std::vector<CopiedSplat> copied;
+  std::vector<SplatCopy> copies;
+  int64_t count = 0;  // afterwards
+};
+
+// Moves splats of opacity below kDeadOpacity, or not finite, to places of others.
+PopulationChange MoveDead(const std::vector<float>& opacity_logits, uint64_t seed,
+                          uint64_t step);
+// Appends up to `more` splats at places of splats that are not dead.
+PopulationChange Grow(const std::vector<float>& opacity_logits, int64_t more, uint64_t seed,
+                      uint64_t step);
+
+}  // namespace regrade

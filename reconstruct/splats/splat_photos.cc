@@ -1,0 +1,56 @@
+#include "reconstruct/splats/splat_photos.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "kernels/base/error.h"
+#include "kernels/image/resize.h"
+#include "kernels/image/undistort_photo.h"
+
+namespace regrade {
+namespace {
+
+SplatPhoto Stored(const Image& photo, const Camera& camera) {
+  SplatPhoto stored{camera, {}, {}};
+  stored.color.resize(photo.pixels.size());
+  std::vector<uint8_t> masked(static_cast<size_t>(photo.num_pixels()));
+  for (size_t i = 0; i < stored.color.size(); ++i) {
+    const float value = photo.pixels[i];
+    if (std::isfinite(value))
+      stored.color[i] =
+          static_cast<uint16_t>(std::lround(std::clamp(value, 0.0f, 1.0f) * 65535.0f));
+    else
+      masked[i / 3] = 1;
+  }
+  if (std::ranges::find(masked, 1) != masked.end()) stored.masked = std::move(masked);
+  return stored;
+}
+
+}  // namespace
+
+SplatPhotos::SplatPhotos(const std::vector<TrainingView>& views, double shrink) {
+  REGRADE_CHECK(!views.empty() && shrink >= 1);
+  for (const TrainingView& view : views) {
+    REGRADE_CHECK(!view.camera.ndc.on() && view.photo->channels == 3);
+    const auto smaller = [&](int side) {
+      return std::max(1, static_cast<int>(std::lround(side / shrink)));
+    };
+    Image photo = UndistortPhoto(*view.photo, view.camera);
+    const int width = smaller(photo.width), height = smaller(photo.height);
+    photo = Resize(photo, width, height);
+    if (!HasColor(photo))
+      throw Error(ExitCode::kInput,
+                  Concat("view ", photos_.size(), " has no unmasked pixel to fit"), "",
+                  "check its mask");
+    photos_.push_back(Stored(photo, view.camera.Undistorted().Resized(width, height)));
+  }
+}
+
+int64_t SplatPhotos::num_pixels() const {
+  int64_t pixels = 0;
+  for (const SplatPhoto& photo : photos_)
+    pixels += int64_t{photo.camera.width} * photo.camera.height;
+  return pixels;
+}
+
+}  // namespace regrade

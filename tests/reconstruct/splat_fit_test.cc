@@ -1,0 +1,222 @@
+// Fits of splats: the population's arithmetic, convergence, the same bits for any number of
+// threads and after a stop.
+#include "reconstruct/splats/fit_splats.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <set>
+
+#include "kernels/splats/extent.h"
+#include "reconstruct/splats/population.h"
+#include "reconstruct/splats/relocation.h"
+#include "reconstruct/splats/splat_engine.h"
+#include "tests/support/ball_views.h"
+#include "tests/support/record_error.h"
+
+namespace regrade {
+namespace {
+
+// --- relocation
+
+// Opacity of n splats in a row at their middle, and the integral along a line through it, by
+// numbers: T (1 - (1 - o' e^(-x^2 / 2 s'^2))^n) over x.
+TEST(Relocation, CopiesLookAsTheOneDid) {
+  for (const double opacity : {0.006, 0.3, 0.9, 0.9999})
+    for (const int n : {2, 3, 10, kMostCopies}) {
+      const SplatCopies each = CopiesOf(opacity, n);
+      EXPECT_NEAR(1 - std::pow(1 - each.opacity, n), opacity, 1e-12) << n;
+      double integral = 0;
+      constexpr double kStep = 1e-3;
+      for (double x = -12; x < 12; x += kStep) {
+        const double wide = x * std::exp(-each.log_scale);
+        integral += kStep * (1 - std::pow(1 - each.opacity * std::exp(-wide * wide / 2), n));
+      }
+      EXPECT_NEAR(integral, opacity * std::sqrt(2 * M_PI), 1e-6) << opacity << ' ' << n;
+    }
+}
+
+TEST(Relocation, OneCopyIsTheSplat) {
+  const SplatCopies each = CopiesOf(0.37, 1);
+  EXPECT_DOUBLE_EQ(each.opacity, 0.37);
+  EXPECT_NEAR(each.log_scale, 0, 1e-15);
+}
+
+// --- population
+
+float LogitOf(double opacity) {
+  return static_cast<float>(std::log(opacity) - std::log1p(-opacity));
+}
+
+TEST(Population, TheDeadMoveToOthersByOpacity) {
+  std::vector<float> logits(1000, LogitOf(0.001));
+  for (size_t i = 0; i < logits.size(); i += 4) logits[i] = LogitOf(i % 8 == 0 ? 0.8 : 0.1);
+  logits[1] = std::numeric_limits<float>::quiet_NaN();
+  const PopulationChange change = MoveDead(logits, 3, 7);
+  EXPECT_EQ(change.count, 1000);
+  EXPECT_EQ(change.copies.size(), 750u);
+  int64_t opaque = 0;
+  std::set<int32_t> places, sources;
+  for (const SplatCopy& copy : change.copies) {
+    EXPECT_NE(copy.to % 4, 0);
+    EXPECT_EQ(copy.from % 4, 0);
+    opaque += copy.from % 8 == 0;
+    places.insert(copy.to);
+    sources.insert(copy.from);
+  }
+  EXPECT_EQ(places.size(), 750u);
+  EXPECT_EQ(sources.size(), change.copied.size());
+  // Binomial with p = 0.8 / 0.9: 667 +- 4 x 8.6.
+  EXPECT_NEAR(static_cast<double>(opaque), 750 * 8.0 / 9, 35);
+  for (const CopiedSplat& copied : change.copied) {
+    EXPECT_LT(copied.opacity_logit, logits[static_cast<size_t>(copied.index)]);
+    EXPECT_LT(copied.log_factor, 0);
+  }
+}
+
+TEST(Population, NothingMovesWhereAllAreDeadOrNone) {
+  EXPECT_TRUE(MoveDead(std::vector<float>(10, -20.0f), 1, 1).copies.empty());
+  EXPECT_TRUE(MoveDead(std::vector<float>(10, 1.0f), 1, 1).copies.empty());
+  EXPECT_TRUE(Grow(std::vector<float>(10, -20.0f), 5, 1, 1).copies.empty());
+}
+
+// One source for many: no more than kMostCopies of it, and no gaps among the new ones.
+TEST(Population, GrowthIsLimitedPerSplat) {
+  std::vector<float> logits(10, -20.0f);
+  logits[4] = 0;
+  const PopulationChange change = Grow(logits, 1000, 1, 1);
+  ASSERT_EQ(change.copies.size(), static_cast<size_t>(kMostCopies - 1));
+  EXPECT_EQ(change.count, 10 + kMostCopies - 1);
+  for (size_t k = 0; k < change.copies.size(); ++k)
+    EXPECT_EQ(change.copies[k].to, static_cast<int32_t>(10 + k));
+}
+
+// --- update
+
+// Noise has the covariance of the splat: E x x^T = noise^2 Sigma Sigma, far below kDeadOpacity,
+// where its share is 1 / (1 + exp(-0.5)).
+TEST(SplatNoise, HasTheSplatsShape) {
+  SplatUpdate update;
+  update.noise = 2;
+  update.seed = 5;
+  Splat<float> splat;
+  splat.log_scale = {std::log(1.0f), std::log(0.5f), std::log(0.1f)};
+  splat.quaternion[0] = 1, splat.quaternion[3] = 1;  // a quarter turn about z
+  splat.opacity_logit = -30;
+  constexpr int kCount = 100000;
+  Vec3d square{};
+  for (int i = 0; i < kCount; ++i) {
+    float mean[3] = {};
+    AddSplatNoise(update, i, splat, mean);
+    for (int a = 0; a < 3; ++a) square[a] += double{mean[a]} * mean[a];
+  }
+  const double share = 2 / (1 + std::exp(-0.5));
+  const double expected[3] = {0.25 * share, 1 * share, 0.01 * share};
+  for (int a = 0; a < 3; ++a)
+    EXPECT_NEAR(std::sqrt(square[a] / kCount), expected[a], 0.01 * expected[a]) << a;
+  splat.opacity_logit = 0;  // and none where it is opaque
+  float mean[3] = {};
+  AddSplatNoise(update, 1, splat, mean);
+  EXPECT_EQ(mean[0], 0);
+}
+
+TEST(UpdateSplat, AGradientThatIsNotFiniteChangesNothing) {
+  Splats splats(2, 4), first(2, 4), second(2, 4);
+  const SplatMoments to{PointersOf(&splats), PointersOf(&first), PointersOf(&second)};
+  SplatUpdate update;
+  update.rates = {1, 1, 1, 1, 1, 1};
+  update.SetStep(0);
+  float d_sh[12] = {};
+  d_sh[11] = std::numeric_limits<float>::infinity();
+  EXPECT_FALSE(UpdateSplat(update, 1, 4, {}, d_sh, to));
+  for (const float value : splats.sh) EXPECT_EQ(value, 0);
+  d_sh[11] = 1;
+  EXPECT_TRUE(UpdateSplat(update, 1, 4, {}, d_sh, to));
+  EXPECT_FLOAT_EQ(splats.sh[23], -1);  // Adam's first step is the rate
+  EXPECT_EQ(splats.sh[22], 0);
+}
+
+// --- fits
+
+class SplatFit : public testing::FitField {
+ protected:
+  void SetUp() override {
+    FitField::SetUp();
+    fit_.steps = 600;
+    fit_.thousands = 3;
+    fit_.sh_degree = 1;
+    box_.background = truth_.background;
+  }
+
+  SplatFitResult FitWith(const SplatFitHooks& hooks = {}) const {
+    return FitSplats(views_, box_, fit_, hooks);
+  }
+  static bool SameSplats(const Splats& a, const Splats& b) {
+    return a.mean == b.mean && a.log_scale == b.log_scale && a.quaternion == b.quaternion &&
+           a.opacity_logit == b.opacity_logit && a.sh == b.sh;
+  }
+
+  SplatFitOptions fit_;
+};
+
+TEST_F(SplatFit, ReproducesAHeldOutView) {
+  SplatFitHooks hooks;
+  double psnr = 0;
+  hooks.measure = [&](SplatEngine* engine) {
+    psnr = testing::Psnr(engine->Render(cameras_[0]).color, photos_[0]);
+  };
+  const SplatFitResult result = FitWith(hooks);
+  EXPECT_EQ(result.rejected, 0);
+  EXPECT_EQ(result.splats.basis, 4);
+  Validate(result.splats, "fit");
+  Image background(48, 48);
+  for (size_t i = 0; i < background.pixels.size(); ++i)
+    background.pixels[i] = truth_.background[static_cast<int>(i % 3)];
+  EXPECT_GT(psnr, testing::Psnr(background, photos_[0]) + 12);
+}
+
+TEST_F(SplatFit, SameBitsForAnyThreadCount) {
+  fit_.steps = 120;
+  const auto with = [&](int n) {
+    const testing::Threads threads(n);
+    return FitWith().splats;
+  };
+  EXPECT_TRUE(testing::RecordSameBits("splats, 1 and 3 threads", testing::Computed::kFloat,
+                                      SameSplats(with(1), with(3))));
+}
+
+TEST_F(SplatFit, AResumedFitIsTheUndisturbedOne) {
+  fit_.steps = 120;
+  fit_.small_until = 0.3f;
+  const SplatFitResult straight = FitWith();
+  for (const int stop_after : {1, 30, 77}) {
+    SplatFitState saved;
+    int done = 0;
+    SplatFitHooks stop;
+    stop.checkpoint = [&](const SplatFitState& state) { saved = state; };
+    stop.progress = [&](const Progress&) {
+      return ++done == stop_after ? LoopControl::kStop : LoopControl::kContinue;
+    };
+    EXPECT_THROW(FitWith(stop), Interrupted);
+    SplatFitHooks resume;
+    resume.resume = &saved;
+    EXPECT_TRUE(SameSplats(FitWith(resume).splats, straight.splats)) << stop_after;
+  }
+}
+
+TEST_F(SplatFit, MaskedPixelsHaveNoInfluence) {
+  fit_.steps = 60;
+  for (size_t i = 0; i < photos_.size(); ++i)
+    for (int y = 0; y < 10; ++y)
+      for (int x = 0; x < 10; ++x)
+        photos_[i].at(x, y)[1] = std::numeric_limits<float>::quiet_NaN();
+  const Splats masked = FitWith().splats;
+  for (size_t i = 0; i < photos_.size(); ++i)
+    for (int y = 0; y < 10; ++y)
+      for (int x = 0; x < 10; ++x) photos_[i].at(x, y)[0] = 1;
+  EXPECT_TRUE(SameSplats(masked, FitWith().splats));
+}
+
+}  // namespace
+}  // namespace regrade
