@@ -1,0 +1,45 @@
+// The splats of each tile of a picture, front to back, on the device.
+//
+// An entry is a splat in a tile. Splats are sorted by z once, 31 bits each; their entries are
+// made in that order and sorted by tile alone, which keeps the order within tiles.
+#pragma once
+
+#include "kernels/device/device_memory.h"
+#include "kernels/splats/cuda/see_splats.h"
+#include "kernels/splats/cuda/splat_record.h"
+
+namespace regrade {
+
+// Device pointers.
+struct TileListsView {
+  TileGrid grid;
+  const int32_t* splat = nullptr;  // [entries], by tile, then front to back: index of a splat
+  const int32_t* first = nullptr;  // [tiles]
+  const int32_t* end = nullptr;    // [tiles]
+};
+
+// 28 bytes for each splat and, with up to 65536 tiles, 12 for each entry, and those of a sort.
+class TileLists {
+ public:
+  // `seen`: of `count` splats; its z_bits and index are overwritten. Waits for the device once.
+  // Throws Error(kResources) if there are 2^31 entries or more.
+  void Make(const SeenSplats& seen, int64_t count, const TileGrid& grid);
+
+  int64_t num_entries() const { return num_entries_; }
+  TileListsView view() const { return view_; }
+  // [splats] A splat's entries by rows of tiles have the slots from this one on; undefined for
+  // splats without tiles.
+  const int32_t* first_slot() const { return first_slot_.data(); }
+
+ private:
+  DeviceBuffer<uint32_t> z_bits_;
+  DeviceBuffer<int32_t> index_, first_slot_;
+  DeviceBuffer<int64_t> offset_;
+  DeviceBuffer<uint8_t> tile_keys_;       // two arrays of 2 or 4 bytes
+  DeviceBuffer<int32_t> entries_, other_entries_, ranges_;
+  DeviceBuffer<uint8_t> scratch_;
+  int64_t num_entries_ = 0;
+  TileListsView view_;
+};
+
+}  // namespace regrade
