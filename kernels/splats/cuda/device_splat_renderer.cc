@@ -4,6 +4,7 @@
 #include "kernels/splats/cuda/dense_adjoint.h"
 #include "kernels/splats/cuda/grow_buffer.h"
 #include "kernels/splats/cuda/see_splats.h"
+#include "kernels/splats/cuda/slot_sums.h"
 #include "kernels/splats/cuda/tile_adjoint.h"
 
 namespace regrade {
@@ -43,7 +44,7 @@ void DeviceSplatRenderer::Render(const SplatsView<float>& splats, const Camera& 
   view_.splats = splats;
   view_.camera = SplatCamera(camera);
   view_.options = options;
-  view_.grid = grid;
+  grid_ = grid;
   const SeenSplats seen{record_.data(), num_tiles_.data(), z_bits_.data(), index_.data()};
   SeeSplatsOnDevice(splats, view_.camera, options, grid, seen);
   lists_.Make(seen, splats.count, grid);
@@ -61,7 +62,7 @@ void DeviceSplatRenderer::Render(const SplatsView<float>& splats, const Camera& 
 }
 
 SplatPicture<float> DeviceSplatRenderer::Download() const {
-  SplatPicture<float> picture(view_.grid.width, view_.grid.height);
+  SplatPicture<float> picture(grid_.width, grid_.height);
   const int64_t pixels = static_cast<int64_t>(picture.depth.size());
   color_.CopyOut(picture.color.data(), 3 * pixels);
   transmittance_.CopyOut(picture.transmittance.data(), pixels);
@@ -75,7 +76,7 @@ const SplatSumsView& DeviceSplatRenderer::SumPixels(const SplatPixels<const floa
   REGRADE_CHECK(pass_ == SplatPass::kAdjoint ||
                 (pass_ == SplatPass::kColorAdjoint && d.depth == nullptr));
   const DeviceRange range("adjoint of splats");
-  const int64_t tiles = view_.grid.count();
+  const int64_t tiles = grid_.count();
   const bool depth = d.depth != nullptr;
   GrowBuffer(tiles * kTilePixels, "gradients of pixels", &pixel_gradient_);
   if (depth) GrowBuffer(tiles * kTilePixels, "gradients of pixels", &pixel_gradient_depth_);
@@ -84,15 +85,18 @@ const SplatSumsView& DeviceSplatRenderer::SumPixels(const SplatPixels<const floa
   const TileGradients gradients{pixel_gradient_.data(),
                                 depth ? pixel_gradient_depth_.data() : nullptr,
                                 background_.data(), background_.data() + 2 * tiles};
-  GatherPixelGradients(view_.grid, pixels_, d, gradients);
+  GatherPixelGradients(grid_, pixels_, d, gradients);
   const int64_t buckets =
-      num_entries() == 0 ? 0 : NumCheckpoints(num_entries(), view_.grid.count());
+      num_entries() == 0 ? 0 : NumCheckpoints(num_entries(), grid_.count());
   AddTileAdjoints(lists_.view(), record_.data(), lists_.first_slot(), Kept(), buckets,
                   gradients, sums_.data());
+  if (num_entries() > 0)
+    SumSlots({grid_, record_.data(), num_tiles_.data(), lists_.first_slot(), lists_.order(),
+              last_.data(), sums_.data()},
+             view_.splats.count);
   view_.record = record_.data();
   view_.num_tiles = num_tiles_.data();
   view_.first_slot = lists_.first_slot();
-  view_.last = last_.data();
   view_.sums = sums_.data();
   view_.d_background = gradients.d_background;
   return view_;

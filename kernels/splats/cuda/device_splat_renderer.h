@@ -53,6 +53,7 @@ class DeviceSplatRenderer {
   KeptTiles Kept() const;
 
   SplatPass pass_ = SplatPass::kPicture;
+  TileGrid grid_;
   SplatPixels<float> pixels_;
   SplatSumsView view_;
   TileLists lists_;

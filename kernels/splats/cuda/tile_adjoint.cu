@@ -1,7 +1,7 @@
-// A bucket's splats are the lanes of half a warp, two splats each, and the tile's pixels pass
-// along the lanes: in step s, lane l adds pixel s - l to its own splats' sums, and hands the
-// pixel's state to the next lane. So a splat's sums stay in registers, and a pixel's state is two
-// numbers: T_i and the scalar
+// A bucket's splats are the splats of 8 lanes, four each, and the tile's pixels pass along the
+// lanes: in step s, lane l adds pixel s - l to its own splats' sums, and hands the pixel's state
+// to the next lane. So a splat's sums stay in registers, and a pixel's state is two numbers: T_i
+// and the scalar
 //   b_i = <C_i, d_C> + Z_i d_Z + T_N d_T = b_0 - sum_{j < i} w_j s_j,   s_j = <c_j, d_C> + z_j d_Z,
 // (C_i, Z_i) what splats from i on add, with the background: T_{i+1} <R_{i+1}, (d_C, d_Z, d_T)> =
 // b_{i+1}, and so
@@ -20,20 +20,27 @@ namespace regrade {
 
 namespace {
 
-constexpr int kLanes = 16;                    // of a bucket
-constexpr int kOfLane = kBucket / kLanes;     // splats of a lane
-constexpr int kGroups = 8;                    // buckets of a block
-constexpr int kSteps = kTilePixels + kLanes - 1;
+#ifndef ADJ_MIN
+#define ADJ_MIN 9
+#endif
+constexpr unsigned kAll = 0xFFFFFFFF;
+constexpr int kLanes = 8;                  // of a bucket
+constexpr int kOfLane = kBucket / kLanes;  // splats of a lane
+constexpr int kGroups = 8;                 // buckets of a block
 
 struct PixelState {
   float transmittance;  // 0: ended
   float behind;         // b_i
 };
 
-// A tile's pixels before a bucket.
+// The pixels of a tile that reach a bucket, one after the other; zeros before and after them
+// are what lanes add in steps without a pixel.
 struct alignas(16) TileState {
-  float4 d[kTilePixels];  // d_C, d_Z
-  float2 state[kSteps + 1];
+  float4 d[kLanes + kTilePixels + kLanes];  // d_C; the pixel's number in the tile, as bits
+  float2 state[kTilePixels + kLanes];
+};
+struct TileDepths {
+  float d[kLanes + kTilePixels + kLanes];  // d_Z
 };
 
 // Of one splat, with w' of TileSplat for w.
@@ -41,7 +48,7 @@ struct Sums {
   float h0 = 0, h1 = 0, h00 = 0, h01 = 0, h11 = 0, f = 0, red = 0, green = 0, blue = 0, z = 0;
 
   template <bool kDepth>
-  __device__ void Add(const TileSplat& splat, float x, float y, const float4& d,
+  __device__ void Add(const TileSplat& splat, float x, float y, const float4& d, float d_depth,
                       PixelState* state) {
     const float across = splat.Across(x), along = splat.Along(splat.Slant(x), y);
     const float exponent = splat.Exponent(across, along);
@@ -55,7 +62,7 @@ struct Sums {
     float s = d.x * splat.color.x;
     s = fmaf(d.y, splat.color.y, s);
     s = fmaf(d.z, splat.color.z, s);
-    if constexpr (kDepth) s = fmaf(d.w, splat.z, s);
+    if constexpr (kDepth) s = fmaf(d_depth, splat.z, s);
     state->behind = fmaf(-weight, s, state->behind);
     const float d_alpha = fmaf(t, s, -state->behind * FastReciprocal(clear));
     const float g = full < float(kMaxAlpha) ? alpha * d_alpha : 0.0f;
@@ -69,7 +76,7 @@ struct Sums {
     red = fmaf(weight, d.x, red);
     green = fmaf(weight, d.y, green);
     blue = fmaf(weight, d.z, blue);
-    if constexpr (kDepth) z = fmaf(weight, d.w, z);
+    if constexpr (kDepth) z = fmaf(weight, d_depth, z);
   }
 
   __device__ SlotSums Unscaled() const {
@@ -78,85 +85,127 @@ struct Sums {
   }
 };
 
-// Lane l loads the pixels l, l + kLanes ...
+// A pixel before a bucket.
 template <bool kDepth>
-__device__ void LoadPixels(const TileGrid& grid, const TileBucket& bucket, int64_t checkpoint,
-                           int lane, const KeptTiles& kept, const TileGradients& gradients,
-                           TileState* tile) {
+__device__ PixelState Before(const TileGrid& grid, const TileBucket& bucket, int64_t place,
+                             int pixel, const PixelGradient& d, float d_depth,
+                             const KeptTiles& kept) {
+  if (bucket.bucket == 0) {
+    const int x = bucket.tile % grid.columns * kDeviceTile + pixel % kDeviceTile;
+    const int y = bucket.tile / grid.columns * kDeviceTile + pixel / kDeviceTile;
+    return {x < grid.width && y < grid.height ? 1.0f : 0.0f, d.total};
+  }
+  const PixelCheckpoint before = kept.checkpoint[place + pixel];
+  float in_front = Dot(before.color, d.color);
+  if constexpr (kDepth) in_front += kept.depth[place + pixel] * d_depth;
+  return {before.transmittance, d.total - in_front};
+}
+
+// Lane l loads the pixels l, l + kLanes ... of its group's bucket; returns how many the tile has
+// that have not ended. Called by whole warps; `on`: the group has a bucket.
+template <bool kDepth>
+__device__ int LoadPixels(const TileGrid& grid, bool on, const TileBucket& bucket,
+                          int64_t checkpoint, int lane, const KeptTiles& kept,
+                          const TileGradients& gradients, TileState* tile, TileDepths* depths) {
+  const int shift = static_cast<int>(threadIdx.x % 32) - lane;
+  const int64_t place = (checkpoint + bucket.bucket) * kTilePixels;
+  int count = 0;
 #pragma unroll
   for (int j = 0; j < kTilePixels / kLanes; ++j) {
     const int p = lane + j * kLanes;
-    const int64_t at = int64_t{bucket.tile} * kTilePixels + p;
-    const PixelGradient d = gradients.pixel[at];
-    const float d_depth = kDepth ? gradients.depth[at] : 0.0f;
-    float2 state;
-    if (bucket.bucket == 0) {
-      const int x = bucket.tile % grid.columns * kDeviceTile + p % kDeviceTile;
-      const int y = bucket.tile / grid.columns * kDeviceTile + p / kDeviceTile;
-      state = {x < grid.width && y < grid.height ? 1.0f : 0.0f, d.total};
-    } else {
-      const int64_t place = (checkpoint + bucket.bucket) * kTilePixels + p;
-      const PixelCheckpoint before = kept.checkpoint[place];
-      float in_front = Dot(before.color, d.color);
-      if constexpr (kDepth) in_front += kept.depth[place] * d_depth;
-      state = {before.transmittance, d.total - in_front};
+    PixelGradient d{};
+    float d_depth = 0;
+    PixelState state{0, 0};
+    if (on) {
+      const int64_t at = int64_t{bucket.tile} * kTilePixels + p;
+      d = gradients.pixel[at];
+      if constexpr (kDepth) d_depth = gradients.depth[at];
+      state = Before<kDepth>(grid, bucket, place, p, d, d_depth, kept);
     }
-    tile->d[p] = {d.color.x, d.color.y, d.color.z, d_depth};
-    tile->state[p] = state;
+    const bool alive = state.transmittance > 0;
+    const unsigned group = __ballot_sync(kAll, alive) >> shift & ((1u << kLanes) - 1);
+    if (alive) {
+      const int to = count + __popc(group & ((1u << lane) - 1));
+      tile->d[kLanes + to] = {d.color.x, d.color.y, d.color.z, __int_as_float(p)};
+      tile->state[to] = {state.transmittance, state.behind};
+      if constexpr (kDepth) depths->d[kLanes + to] = d_depth;
+    }
+    count += __popc(group);
   }
-  if (lane < kSteps + 1 - kTilePixels) tile->state[kTilePixels + lane] = {0, 0};
+  return count;
 }
 
 template <bool kDepth>
-__global__ void __launch_bounds__(kGroups* kLanes)
+__device__ void ClearAround(int count, int end, int lane, TileState* tile, TileDepths* depths) {
+  const float4 zero{0, 0, 0, 0};
+  tile->d[lane] = zero;
+  if constexpr (kDepth) depths->d[lane] = 0;
+  for (int p = count + lane; p < end; p += kLanes) {
+    tile->d[kLanes + p] = zero;
+    tile->state[p] = {0, 0};
+    if constexpr (kDepth) depths->d[kLanes + p] = 0;
+  }
+}
+
+template <bool kDepth>
+__global__ void __launch_bounds__(kGroups* kLanes, kDepth ? 8 : ADJ_MIN)
     Adjoint(TileListsView lists, const SplatRecord* record, const int32_t* first_slot,
             KeptTiles kept, TileGradients gradients, SlotSums* sums) {
   __shared__ alignas(16) char shared[kGroups * sizeof(TileState)];
+  __shared__ TileDepths all_depths[kDepth ? kGroups : 1];
   const int group = static_cast<int>(threadIdx.x) / kLanes;
   const int lane = static_cast<int>(threadIdx.x) % kLanes;
-  const unsigned mask = ((1u << kLanes) - 1) << (threadIdx.x % 32 / kLanes * kLanes);
   TileState* const tile = reinterpret_cast<TileState*>(shared) + group;
+  TileDepths* const depths = all_depths + (kDepth ? group : 0);
   const int64_t place = blockIdx.x * int64_t{kGroups} + group;
-  if (place >= *kept.num_buckets) return;
-  const TileBucket bucket = kept.bucket[place];
+  const int num_buckets = *kept.num_buckets;
+  if (blockIdx.x * int64_t{kGroups} >= num_buckets) return;
+  const bool on = place < num_buckets;
+  const TileBucket bucket = on ? kept.bucket[place] : TileBucket{0, 0};
   const TileGrid& grid = lists.grid;
   const int column = bucket.tile % grid.columns, row = bucket.tile / grid.columns;
-  const int first = lists.first[bucket.tile], end = lists.end[bucket.tile];
-  LoadPixels<kDepth>(grid, bucket, FirstCheckpoint(bucket.tile, first), lane, kept, gradients,
-                     tile);
+  const int first = lists.first[bucket.tile], end = on ? lists.end[bucket.tile] : 0;
+  const int count =
+      LoadPixels<kDepth>(grid, on, bucket, FirstCheckpoint(bucket.tile, first), lane, kept,
+                         gradients, tile, depths);
+  // All groups of a warp go as many steps.
+  const int steps = __reduce_max_sync(kAll, count) + kLanes - 1;
+  ClearAround<kDepth>(count, steps, lane, tile, depths);
 
   const int entry = first + bucket.bucket * kBucket + lane * kOfLane;
   TileSplat splat[kOfLane];
-  int64_t slot[kOfLane];  // -1: no splat
   Sums sum[kOfLane];
 #pragma unroll
   for (int k = 0; k < kOfLane; ++k) {
-    slot[k] = -1;
-    if (entry + k >= end) continue;
-    const int32_t index = lists.splat[entry + k];
-    const SplatRecord own = record[index];
-    splat[k] = TileSplat(own, column * kDeviceTile, row * kDeviceTile);
-    slot[k] = int64_t{first_slot[index]} + SplatTiles(own, grid).PlaceOf(column, row);
+    if (entry + k < end)
+      splat[k] = TileSplat(record[lists.splat[entry + k]], column * kDeviceTile,
+                           row * kDeviceTile);
   }
-  __syncwarp(mask);
+  __syncwarp();
 
   PixelState state{0, 0};
-  int pixel = -lane;
-  for (int step = 0; step < kSteps; ++step) {
-    state.transmittance = __shfl_up_sync(mask, state.transmittance, 1, kLanes);
-    state.behind = __shfl_up_sync(mask, state.behind, 1, kLanes);
+  const float4* d_pixel = tile->d + (kLanes - lane);
+  const float* d_depth = depths->d + (kLanes - lane);
+  for (int step = 0; step < steps; ++step) {
+    state.transmittance = __shfl_up_sync(kAll, state.transmittance, 1, kLanes);
+    state.behind = __shfl_up_sync(kAll, state.behind, 1, kLanes);
     const float2 entering = tile->state[step];
     if (lane == 0) state = {entering.x, entering.y};
-    const float4 d = tile->d[pixel & (kTilePixels - 1)];
-    const float x = static_cast<float>(pixel & (kDeviceTile - 1));
-    const float y = static_cast<float>(pixel >> 3);
+    const float4 d = d_pixel[step];
+    const unsigned pixel = __float_as_uint(d.w);
+    const float x = static_cast<float>(pixel % kDeviceTile);
+    const float y = static_cast<float>(pixel / kDeviceTile);
 #pragma unroll
-    for (int k = 0; k < kOfLane; ++k) sum[k].Add<kDepth>(splat[k], x, y, d, &state);
-    ++pixel;
+    for (int k = 0; k < kOfLane; ++k)
+      sum[k].Add<kDepth>(splat[k], x, y, d, kDepth ? d_depth[step] : 0.0f, &state);
   }
 #pragma unroll
   for (int k = 0; k < kOfLane; ++k)
-    if (slot[k] >= 0) sums[slot[k]] = sum[k].Unscaled();
+    if (entry + k < end) {
+      const int32_t index = lists.splat[entry + k];
+      const int slot = SplatTiles(record[index], grid).PlaceOf(column, row);
+      sums[int64_t{first_slot[index]} + slot] = sum[k].Unscaled();
+    }
 }
 
 }  // namespace

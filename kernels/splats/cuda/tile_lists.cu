@@ -18,7 +18,10 @@ namespace regrade {
 
 namespace {
 
-constexpr int kManyTiles = 48;  // a warp shares the work for splats with more
+constexpr unsigned kAll = 0xFFFFFFFF;
+constexpr int kManyTiles = 48;      // a warp shares the work for splats with more
+constexpr int kEntryThreads = 128;  // of a block that makes entries
+constexpr int kStaged = 768;        // entries of a warp in shared memory
 
 __device__ int64_t Thread() {
   return blockIdx.x * static_cast<int64_t>(blockDim.x) + threadIdx.x;
@@ -31,46 +34,76 @@ __global__ void CountInOrder(const int32_t* order, const int32_t* num_tiles, int
   if (k <= n) offset[k] = k < n ? num_tiles[order[k]] : 0;
 }
 
+// A thread for each splat in order. The slots of a warp's splats are consecutive: they are made
+// in shared memory, if there is room, and written in order.
 template <typename Key>
-__device__ void MakeEntry(int64_t slot, int tile, int32_t splat, Key* key, int32_t* entry) {
-  key[slot] = static_cast<Key>(tile);
-  entry[slot] = splat;
-}
-
-// A thread for each splat in order.
-template <typename Key>
-__global__ void MakeEntries(const int32_t* order, const int64_t* offset, int64_t n,
-                            const SplatRecord* record, TileGrid grid, int32_t* first_slot,
-                            Key* key, int32_t* entry) {
+__global__ void __launch_bounds__(kEntryThreads)
+    MakeEntries(const int32_t* order, const int64_t* offset, int64_t n,
+                const SplatRecord* record, TileGrid grid, int32_t* first_slot, Key* key,
+                int32_t* entry) {
+  __shared__ uint32_t staged[kEntryThreads / 32][kStaged];  // tile, lane of the splat
+  uint32_t* const stage = staged[threadIdx.x / 32];
+  const int lane = static_cast<int>(threadIdx.x % 32);
   const int64_t k = Thread();
-  const int64_t first = k < n ? offset[k] : 0;
-  const int64_t count = k < n ? offset[k + 1] - first : 0;
-  const int32_t splat = count > 0 ? order[k] : 0;
-  if (count > 0) {
-    first_slot[splat] = static_cast<int32_t>(first);
-    if (count <= kManyTiles)
-      SplatTiles(record[splat], grid).ForAll([&](int tile, int place) {
-        MakeEntry(first + place, tile, splat, key, entry);
-      });
+  const int64_t first = offset[min(k, n)], end = offset[min(k + 1, n)];
+  const int64_t begin_of_warp = __shfl_sync(kAll, first, 0);
+  const int64_t end_of_warp = __shfl_sync(kAll, end, 31);
+  if (begin_of_warp == end_of_warp) return;
+  const int32_t splat = first < end ? order[k] : 0;
+  if (first < end) first_slot[splat] = static_cast<int32_t>(first);
+  const bool many = end - first > kManyTiles;
+  const bool in_stage = end_of_warp - begin_of_warp <= kStaged;
+  const int start = static_cast<int>(first - begin_of_warp);
+  if (first < end && !(many && !in_stage))
+    SplatTiles(record[splat], grid).ForAll([&](int tile, int place) {
+      if (in_stage) {
+        stage[start + place] = static_cast<uint32_t>(tile) << 5 | static_cast<uint32_t>(lane);
+      } else {
+        key[first + place] = static_cast<Key>(tile);
+        entry[first + place] = splat;
+      }
+    });
+  if (in_stage) {
+    __syncwarp();
+    const int total = static_cast<int>(end_of_warp - begin_of_warp);
+    for (int base = 0; base < total; base += 32) {
+      const int at = base + lane;
+      const uint32_t made = at < total ? stage[at] : 0;
+      const int32_t its = __shfl_sync(kAll, splat, static_cast<int>(made & 31));
+      if (at >= total) continue;
+      key[begin_of_warp + at] = static_cast<Key>(made >> 5);
+      entry[begin_of_warp + at] = its;
+    }
+    return;
   }
-  for (unsigned many = __ballot_sync(0xFFFFFFFF, count > kManyTiles); many != 0;
-       many &= many - 1) {
-    const int lane = __ffs(static_cast<int>(many)) - 1;
-    const int32_t shared = __shfl_sync(0xFFFFFFFF, splat, lane);
-    const int64_t from = __shfl_sync(0xFFFFFFFF, first, lane);
+  for (unsigned left = __ballot_sync(kAll, many); left != 0; left &= left - 1) {
+    const int source = __ffs(static_cast<int>(left)) - 1;
+    const int32_t shared = __shfl_sync(kAll, splat, source);
+    const int64_t from = __shfl_sync(kAll, first, source);
     SplatTiles(record[shared], grid).ForAllByWarp([&](int tile, int place) {
-      MakeEntry(from + place, tile, shared, key, entry);
+      key[from + place] = static_cast<Key>(tile);
+      entry[from + place] = shared;
     });
   }
 }
 
+// A thread for kRun consecutive entries.
+constexpr int kRun = 4;
 template <typename Key>
 __global__ void FindRanges(const Key* key, int64_t entries, int32_t* first, int32_t* end) {
-  const int64_t e = Thread();
-  if (e >= entries) return;
-  const Key own = key[e];
-  if (e == 0 || key[e - 1] != own) first[own] = static_cast<int32_t>(e);
-  if (e + 1 == entries || key[e + 1] != own) end[own] = static_cast<int32_t>(e + 1);
+  const int64_t begin = kRun * Thread();
+  if (begin >= entries) return;
+  int64_t before = begin > 0 ? int64_t{key[begin - 1]} : -1;
+#pragma unroll
+  for (int k = 0; k <= kRun; ++k) {
+    const int64_t e = begin + k;
+    const int64_t own = e < entries ? int64_t{key[e]} : -1;
+    if (own != before) {
+      if (k < kRun && own >= 0) first[own] = static_cast<int32_t>(e);
+      if (k > 0 && before >= 0) end[before] = static_cast<int32_t>(e);
+    }
+    before = own;
+  }
 }
 
 int BitsOf(int64_t values) {
@@ -117,6 +150,7 @@ void TileLists::Make(const SeenSplats& seen, int64_t count, const TileGrid& grid
   cub::DoubleBuffer<uint32_t> z(seen.z_bits, z_bits_.data());
   cub::DoubleBuffer<int32_t> order(seen.index, index_.data());
   Sort(count, 32, &z, &order, &scratch_);
+  order_ = order.Current();
   CountInOrder<<<BlocksFor(count + 1), kThreads, 0, LaunchStream()>>>(
       order.Current(), seen.num_tiles, count, offset_.data());
   CheckLaunch("count_in_order");
@@ -141,12 +175,14 @@ void TileLists::Make(const SeenSplats& seen, int64_t count, const TileGrid& grid
     GrowBuffer(2 * bytes, "tiles of splats", &tile_keys_);
     cub::DoubleBuffer<Key> keys(reinterpret_cast<Key*>(tile_keys_.data()),
                                 reinterpret_cast<Key*>(tile_keys_.data() + bytes));
-    MakeEntries<<<BlocksFor(count), kThreads, 0, LaunchStream()>>>(
+    const unsigned blocks =
+        static_cast<unsigned>((count + kEntryThreads - 1) / kEntryThreads);
+    MakeEntries<<<blocks, kEntryThreads, 0, LaunchStream()>>>(
         order.Current(), offset_.data(), count, seen.record, grid, first_slot_.data(),
         keys.Current(), entries.Current());
     CheckLaunch("make_entries");
     Sort(num_entries_, BitsOf(tiles), &keys, &entries, &scratch_);
-    FindRanges<<<BlocksFor(num_entries_), kThreads, 0, LaunchStream()>>>(
+    FindRanges<<<BlocksFor((num_entries_ + kRun - 1) / kRun), kThreads, 0, LaunchStream()>>>(
         keys.Current(), num_entries_, ranges_.data(), ranges_.data() + tiles);
     CheckLaunch("find_ranges");
   };

@@ -30,6 +30,8 @@ class TileLists {
   // [splats] A splat's entries by rows of tiles have the slots from this one on; undefined for
   // splats without tiles.
   const int32_t* first_slot() const { return first_slot_.data(); }
+  // [splats] Splats in the order of their slots, those without tiles last.
+  const int32_t* order() const { return order_; }
 
  private:
   DeviceBuffer<uint32_t> z_bits_;
@@ -38,6 +40,7 @@ class TileLists {
   DeviceBuffer<uint8_t> tile_keys_;       // two arrays of 2 or 4 bytes
   DeviceBuffer<int32_t> entries_, other_entries_, ranges_;
   DeviceBuffer<uint8_t> scratch_;
+  const int32_t* order_ = nullptr;
   int64_t num_entries_ = 0;
   TileListsView view_;
 };
