@@ -88,7 +88,7 @@ __global__ void __launch_bounds__(32 * kWarps)
   int32_t next = first + lane < end ? lists.splat[first + lane] : 0;
   for (int at = first; at < end; at += kBucket) {
     if (!__any_sync(kAll, one.running > 0 || two.running > 0)) break;
-    if (kKeep && buckets > 0) {
+    if constexpr (kKeep) {
       const int64_t place = (checkpoint + buckets) * kTilePixels + lane;
       Keep<kDepth>(one, place, kept);
       Keep<kDepth>(two, place + 32, kept);

@@ -27,8 +27,7 @@ struct alignas(8) TileBucket {
   int32_t tile, bucket;
 };
 
-// What is kept for the adjoint. Bucket b of a tile has the checkpoint FirstCheckpoint(tile) + b;
-// those of first buckets are not written.
+// What is kept for the adjoint. Bucket b of a tile has the checkpoint FirstCheckpoint(tile) + b.
 struct KeptTiles {
   PixelCheckpoint* checkpoint = nullptr;  // [checkpoints, kTilePixels]
   float* depth = nullptr;                 // [checkpoints, kTilePixels]; or null: not kept

@@ -9,24 +9,21 @@ namespace {
 struct StoreGradient {
   float *mean, *log_scale, *quaternion, *opacity_logit, *sh;
 
-  template <int kBasis>
-  __device__ void operator()(int64_t i, const Splat<float>& d,
-                             const ShGradient<kBasis>& d_sh) const {
+  __device__ void Shape(int64_t i, const Splat<float>& d) const {
     for (int a = 0; a < 3; ++a) {
       mean[3 * i + a] = d.mean[a];
       log_scale[3 * i + a] = d.log_scale[a];
     }
-    for (int a = 0; a < 4; ++a) quaternion[4 * i + a] = d.quaternion[a];
+    reinterpret_cast<float4*>(quaternion)[i] = {d.quaternion[0], d.quaternion[1],
+                                                d.quaternion[2], d.quaternion[3]};
     opacity_logit[i] = d.opacity_logit;
-    float* const to = sh + 3 * kBasis * i;
-    if constexpr (kBasis % 4 == 0) {
-#pragma unroll
-      for (int k = 0; k < 3 * kBasis; k += 4)
-        reinterpret_cast<float4*>(to)[k / 4] = {d_sh[k], d_sh[k + 1], d_sh[k + 2], d_sh[k + 3]};
-    } else {
-#pragma unroll
-      for (int k = 0; k < 3 * kBasis; ++k) to[k] = d_sh[k];
-    }
+  }
+  template <int kCount>
+  __device__ void Color(int64_t at, int, const float* d) const {
+    if constexpr (kCount == 4)
+      reinterpret_cast<float4*>(sh)[at / 4] = {d[0], d[1], d[2], d[3]};
+    else
+      sh[at] = d[0];
   }
 };
 

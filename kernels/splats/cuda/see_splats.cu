@@ -51,7 +51,11 @@ __global__ void __launch_bounds__(kBlock)
 template <int kBasis>
 __global__ void __launch_bounds__(kBlock)
     Color(SplatsView<float> splats, Vec3d center, SeenSplats seen) {
-  SeenList<kBlock>::ForSeen(seen.num_tiles, splats.count, [&](int64_t i) {
+  using List = SeenList<kBlock>;
+  __shared__ uint16_t list[List::kChunk];
+  const int count = List::Make(seen.num_tiles, splats.count, list);
+  for (int k = static_cast<int>(threadIdx.x); k < count; k += kBlock) {
+    const int64_t i = List::First() + list[k];
     OwnSplat<kBasis> own;
     own.LoadColor(splats, i);
     for (int a = 0; a < 3; ++a) own.values.mean[a] = splats.mean[3 * i + a];
@@ -62,7 +66,7 @@ __global__ void __launch_bounds__(kBlock)
       seen.num_tiles[i] = 0;
       seen.z_bits[i] = kUnseen;
     }
-  });
+  }
 }
 
 }  // namespace

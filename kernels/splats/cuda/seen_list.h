@@ -16,14 +16,15 @@ struct SeenList {
     return static_cast<unsigned>((count + kChunk - 1) / kChunk);
   }
 
-  // Calls visit(i) for the splats of this block's chunk with tiles. Called by whole blocks.
-  template <typename Visit>
-  static __device__ void ForSeen(const int32_t* num_tiles, int64_t count, const Visit& visit) {
+  static __device__ int64_t First() { return blockIdx.x * int64_t{kChunk}; }
+
+  // Fills list [kChunk] with the splats of this block's chunk that have tiles, in order, counted
+  // from the chunk's first one; returns their number. Called by whole blocks, which it lets wait.
+  static __device__ int Make(const int32_t* num_tiles, int64_t count, uint16_t* list) {
     constexpr int kWarps = kBlock / 32;
     __shared__ int in_warp[kRounds * kWarps];
-    __shared__ uint16_t list[kChunk];
     const int thread = static_cast<int>(threadIdx.x), lane = thread % 32, warp = thread / 32;
-    const int64_t first = blockIdx.x * int64_t{kChunk};
+    const int64_t first = First();
     unsigned seen[kRounds];
 #pragma unroll
     for (int r = 0; r < kRounds; ++r) {
@@ -44,7 +45,7 @@ struct SeenList {
             static_cast<uint16_t>(r * kBlock + thread);
     }
     __syncthreads();
-    for (int k = thread; k < total; k += kBlock) visit(first + list[k]);
+    return total;
   }
 };
 

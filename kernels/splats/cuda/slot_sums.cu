@@ -1,7 +1,6 @@
 #include "kernels/splats/cuda/slot_sums.h"
 
 #include "kernels/device/device_stream.h"
-#include "kernels/device/launch_size.h"
 
 namespace regrade {
 
@@ -10,7 +9,8 @@ namespace regrade {
 namespace {
 
 constexpr unsigned kAll = 0xFFFFFFFF;
-constexpr int kManyTiles = 48;  // a warp shares the work for splats with more
+constexpr int kBlock = 128;     // threads
+constexpr int kManyTiles = 48;  // at most 64; a warp shares the work for splats with more
 
 struct Total {
   double value[10] = {};
@@ -34,6 +34,27 @@ struct Total {
   }
 };
 
+// Of a thread's splat with at most kManyTiles. Which slots were written is found first, so that
+// loads of several slots overlap.
+__device__ Total SumOfFew(const SlotsOfSplats& slots, int32_t i, int tiles) {
+  const SplatRecord record = slots.record[i];
+  const uint64_t order = OrderOf(__float_as_uint(record.z), i);
+  const SlotSums* const first = slots.sums + slots.first_slot[i];
+  uint64_t written = 0;
+  SplatTiles(record, slots.grid).ForAll([&](int tile, int place) {
+    if (order <= slots.last[tile]) written |= uint64_t{1} << place;
+  });
+  Total total;
+#pragma unroll 4
+  for (int place = 0; place < tiles; ++place) {
+    const bool on = written >> place & 1;
+    SlotSums slot{};
+    if (on) slot = first[place];
+    total.Add(slot);
+  }
+  return total;
+}
+
 // Calls for_tiles(add), with add(tile, place) for the tiles of splat i.
 template <typename ForTiles>
 __device__ Total SumOf(const SlotsOfSplats& slots, int32_t i, const SplatRecord& record,
@@ -48,15 +69,12 @@ __device__ Total SumOf(const SlotsOfSplats& slots, int32_t i, const SplatRecord&
 }
 
 // A thread for each splat in order.
-__global__ void __launch_bounds__(kThreads) Sum(SlotsOfSplats slots, int64_t count) {
+__global__ void __launch_bounds__(kBlock) Sum(SlotsOfSplats slots, int64_t count) {
   const int64_t k = blockIdx.x * static_cast<int64_t>(blockDim.x) + threadIdx.x;
   const int32_t i = k < count ? slots.order[k] : 0;
   const int tiles = k < count ? slots.num_tiles[i] : 0;
   if (tiles > 0 && tiles <= kManyTiles) {
-    const SplatRecord record = slots.record[i];
-    const Total total = SumOf(slots, i, record, [&](const auto& add) {
-      SplatTiles(record, slots.grid).ForAll(add);
-    });
+    const Total total = SumOfFew(slots, i, tiles);
     slots.sums[slots.first_slot[i]] = total.Rounded();
   }
   for (unsigned many = __ballot_sync(kAll, tiles > kManyTiles); many != 0; many &= many - 1) {
@@ -76,7 +94,7 @@ __global__ void __launch_bounds__(kThreads) Sum(SlotsOfSplats slots, int64_t cou
 
 void SumSlots(const SlotsOfSplats& slots, int64_t count) {
   if (count == 0) return;
-  Sum<<<BlocksFor(count), kThreads, 0, LaunchStream()>>>(slots, count);
+  Sum<<<static_cast<unsigned>((count + kBlock - 1) / kBlock), kBlock, 0, LaunchStream()>>>(slots, count);
   CheckLaunch("sum_slots");
 }
 

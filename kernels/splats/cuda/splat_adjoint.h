@@ -29,24 +29,24 @@ struct SplatSumsView {
   const Vec3f* d_background = nullptr;  // [1]
 };
 
-// d_sh [3, basis] of a splat: products of the harmonics and the colour's gradient, made where
-// they are used. k must be known when a loop is unrolled, or the harmonics leave the registers.
-template <int kBasis>
-struct ShGradient {
-  float gamma[kBasis];
-  Vec3f d_color;  // 0 where the colour is 0, see EQ(splat-color)
-
-  HD float operator[](int k) const { return d_color[k / kBasis] * gamma[k % kBasis]; }
-};
-
 #if defined(__CUDACC__)
 
 namespace splat_adjoint {
 
 constexpr int kBlock = 128;  // threads
 
-template <int kBasis, typename Use>
-__device__ void UseOne(const SplatSumsView& view, int64_t i, const Use& use) {
+// What d_sh [3, basis] of a splat are products of.
+template <int kBasis>
+struct ColorGradient {
+  float gamma[kBasis];
+  Vec3f d_color;  // 0 where the colour is 0, see EQ(splat-color)
+
+  __device__ float operator[](int k) const { return d_color[k / kBasis] * gamma[k % kBasis]; }
+};
+
+template <int kBasis>
+__device__ Splat<float> AdjointOf(const SplatSumsView& view, int64_t i,
+                                  ColorGradient<kBasis>* by_color) {
   const SlotSums slot = view.sums[view.first_slot[i]];
   SplatSums<float> sums;
   for (int a = 0; a < 2; ++a) sums.ellipse.h[a] = slot.h[a];
@@ -62,26 +62,61 @@ __device__ void UseOne(const SplatSumsView& view, int64_t i, const Use& use) {
   Splat<float> d{};
   float unused[3 * kBasis] = {};
   SeeSplatAdjoint(view.camera, view.options, own.view(), seen, sums, &d, unused);
-  ShGradient<kBasis> d_sh;
-  ShBasisTo3(kBasis, DirectionToMean(view.camera.center, own.values.mean).unit, d_sh.gamma);
-  for (int c = 0; c < 3; ++c) d_sh.d_color[c] = seen.color[c] > 0 ? sums.color[c] : 0.0f;
-  use(i, d, d_sh);
+  float gamma[kBasis];
+  ShBasisTo3(kBasis, DirectionToMean(view.camera.center, own.values.mean).unit, gamma);
+  for (int k = 0; k < kBasis; ++k) by_color->gamma[k] = gamma[k];
+  for (int c = 0; c < 3; ++c)
+    by_color->d_color[c] = seen.color[c] > 0 ? sums.color[c] : 0.0f;
+  return d;
+}
+
+// Hands out d_sh of `count` splats by neighbouring threads: rows of coefficients are long.
+template <int kBasis, typename Use>
+__device__ void UseColors(const ColorGradient<kBasis>* by_color, const uint16_t* list, int count,
+                          int64_t first, const Use& use) {
+  constexpr int kValues = 3 * kBasis, kParts = kValues % 4 == 0 ? 4 : 1;
+  constexpr int kOfSplat = kValues / kParts;
+  for (int part = static_cast<int>(threadIdx.x); part < count * kOfSplat; part += kBlock) {
+    const int k = part % kOfSplat * kParts;
+    const ColorGradient<kBasis>& own = by_color[part / kOfSplat];
+    float d[kParts];
+#pragma unroll
+    for (int p = 0; p < kParts; ++p) d[p] = own[k + p];
+    use.template Color<kParts>(kValues * (first + list[part / kOfSplat]) + k, k, d);
+  }
 }
 
 template <int kBasis, typename Use>
 __global__ void __launch_bounds__(kBlock, 4) UseGradients(SplatSumsView view, Use use) {
-  SeenList<kBlock>::ForSeen(view.num_tiles, view.splats.count,
-                            [&](int64_t i) { UseOne<kBasis>(view, i, use); });
+  using List = SeenList<kBlock>;
+  __shared__ uint16_t list[List::kChunk];
+  __shared__ alignas(16) char shared[kBlock * sizeof(ColorGradient<kBasis>)];
+  auto* const by_color = reinterpret_cast<ColorGradient<kBasis>*>(shared);
+  const int total = List::Make(view.num_tiles, view.splats.count, list);
+  for (int begin = 0; begin < total; begin += kBlock) {
+    const int count = min(kBlock, total - begin), thread = static_cast<int>(threadIdx.x);
+    if (thread < count) {
+      const int64_t i = List::First() + list[begin + thread];
+      use.Shape(i, AdjointOf(view, i, by_color + thread));
+    }
+    __syncthreads();
+    UseColors(by_color, list + begin, count, List::First(), use);
+    __syncthreads();
+  }
 }
 
 }  // namespace splat_adjoint
 
-// Calls use(index, d, d_sh) on the device, once for each splat that meets a tile of the picture:
-//   template <int kBasis>
-//   __device__ void operator()(int64_t index, const Splat<float>& d,
-//                              const ShGradient<kBasis>& d_sh) const;
-// by a thread that reads no other splat's values, and its own before the call: `use` may change
-// the values of splat `index`. The same bits in every run.
+// Hands all gradients of splats that meet a tile of the picture to `use`, on the device, once:
+//   __device__ void Shape(int64_t index, const Splat<float>& d) const;
+//     all but the colour of splat `index`;
+//   template <int kCount>
+//   __device__ void Color(int64_t at, int k, const float* d) const;
+//     of the coefficients sh[at], ..., sh[at + kCount - 1], which are k, k + 1 ... of the
+//     [3, basis] of their splat. kCount is 4 for a basis of 4 or 16, with `at` a multiple of 4,
+//     and otherwise 1.
+// The values of a splat are read before its gradients are handed out, and by no other splat's
+// thread: `use` may change the values whose gradient it has. The same bits in every run.
 template <typename Use>
 void UseSplatGradients(const SplatSumsView& view, const Use& use) {
   using namespace splat_adjoint;

@@ -5,6 +5,7 @@
 #include <cstdint>
 
 #include "kernels/base/vec.h"
+#include "kernels/splats/cuda/device_math.h"
 #include "kernels/splats/extent.h"
 
 namespace regrade {
@@ -51,8 +52,8 @@ struct TileSpan {
 // and the extreme points +-c00 R are at t = +-R c10 / L.
 //
 // Wider than the ellipse by some roundings, and never narrower: a tile too many does no harm.
-// All arithmetic is of single IEEE operations, which compilers do not merge: every kernel finds
-// the same tiles, and so the same slot for each of them.
+// All arithmetic is of single operations, which compilers do not merge: every kernel finds the
+// same tiles, and so the same slot for each of them.
 class SplatTiles {
  public:
   __device__ SplatTiles(const SplatRecord& r, const TileGrid& grid) : columns_(grid.columns) {
@@ -60,12 +61,13 @@ class SplatTiles {
     v_ = static_cast<float>(r.v);
     c00_ = r.c00;
     const float square = __fmul_rn(2, __fsub_rn(r.log_opacity, float(kLogMinAlpha)));
-    radius_ = __fadd_rn(__fmul_rn(__fsqrt_rn(fmaxf(square, 0)), 1 + float(kExtentMargin)),
+    radius_ = __fadd_rn(__fmul_rn(FastRoot(fmaxf(square, 0)), 1 + float(kExtentMargin)),
                         float(kExtentMargin));
     const float most = fmaxf(fabsf(r.c10), r.c11);
-    const float s0 = __fdiv_rn(r.c10, most), s1 = __fdiv_rn(r.c11, most);
-    const float length = __fmul_rn(most, __fsqrt_rn(__fmaf_rn(s0, s0, __fmul_rn(s1, s1))));
-    inverse_ = __fdiv_rn(1, length);
+    const float scale = FastReciprocal(most);
+    const float s0 = __fmul_rn(r.c10, scale), s1 = __fmul_rn(r.c11, scale);
+    const float length = __fmul_rn(most, FastRoot(__fmaf_rn(s0, s0, __fmul_rn(s1, s1))));
+    inverse_ = FastReciprocal(length);
     k0_ = __fmul_rn(r.c10, inverse_);
     k1_ = __fmul_rn(r.c11, inverse_);
     const float high = __fmul_rn(length, radius_), wide = __fmul_rn(r.c00, radius_);
@@ -166,7 +168,7 @@ class SplatTiles {
     const float t =
         fminf(fmaxf(fminf(fmaxf(extreme, low), high), -radius_), radius_);
     if (t == extreme) return __fmul_rn(sign, radius_);
-    const float half = __fsqrt_rn(fmaxf(
+    const float half = FastRoot(fmaxf(
         __fsub_rn(__fmul_rn(radius_, radius_), __fmul_rn(t, t)), 0));
     return __fmaf_rn(k0_, t, __fmul_rn(sign, __fmul_rn(k1_, half)));
   }

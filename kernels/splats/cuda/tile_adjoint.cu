@@ -38,6 +38,7 @@ struct PixelState {
 struct alignas(16) TileState {
   float4 d[kLanes + kTilePixels + kLanes];  // d_C; the pixel's number in the tile, as bits
   float2 state[kTilePixels + kLanes];
+  int32_t slot[kBucket];
 };
 struct TileDepths {
   float d[kLanes + kTilePixels + kLanes];  // d_Z
@@ -85,50 +86,39 @@ struct Sums {
   }
 };
 
-// A pixel before a bucket.
-template <bool kDepth>
-__device__ PixelState Before(const TileGrid& grid, const TileBucket& bucket, int64_t place,
-                             int pixel, const PixelGradient& d, float d_depth,
-                             const KeptTiles& kept) {
-  if (bucket.bucket == 0) {
-    const int x = bucket.tile % grid.columns * kDeviceTile + pixel % kDeviceTile;
-    const int y = bucket.tile / grid.columns * kDeviceTile + pixel / kDeviceTile;
-    return {x < grid.width && y < grid.height ? 1.0f : 0.0f, d.total};
-  }
-  const PixelCheckpoint before = kept.checkpoint[place + pixel];
-  float in_front = Dot(before.color, d.color);
-  if constexpr (kDepth) in_front += kept.depth[place + pixel] * d_depth;
-  return {before.transmittance, d.total - in_front};
-}
-
 // Lane l loads the pixels l, l + kLanes ... of its group's bucket; returns how many the tile has
-// that have not ended. Called by whole warps; `on`: the group has a bucket.
+// that have not ended. Called by whole warps. All loads come first, so that they overlap.
 template <bool kDepth>
-__device__ int LoadPixels(const TileGrid& grid, bool on, const TileBucket& bucket,
-                          int64_t checkpoint, int lane, const KeptTiles& kept,
-                          const TileGradients& gradients, TileState* tile, TileDepths* depths) {
+__device__ int LoadPixels(const TileBucket& bucket, int64_t checkpoint, int lane,
+                          const KeptTiles& kept, const TileGradients& gradients,
+                          TileState* tile, TileDepths* depths) {
+  constexpr int kOwn = kTilePixels / kLanes;
   const int shift = static_cast<int>(threadIdx.x % 32) - lane;
-  const int64_t place = (checkpoint + bucket.bucket) * kTilePixels;
+  const int64_t pixels = int64_t{bucket.tile} * kTilePixels + lane;
+  const int64_t place = (checkpoint + bucket.bucket) * kTilePixels + lane;
+  PixelGradient d[kOwn];
+  PixelCheckpoint before[kOwn];
+#pragma unroll
+  for (int j = 0; j < kOwn; ++j) {
+    d[j] = gradients.pixel[pixels + j * kLanes];
+    before[j] = kept.checkpoint[place + j * kLanes];
+  }
   int count = 0;
 #pragma unroll
-  for (int j = 0; j < kTilePixels / kLanes; ++j) {
-    const int p = lane + j * kLanes;
-    PixelGradient d{};
-    float d_depth = 0;
-    PixelState state{0, 0};
-    if (on) {
-      const int64_t at = int64_t{bucket.tile} * kTilePixels + p;
-      d = gradients.pixel[at];
-      if constexpr (kDepth) d_depth = gradients.depth[at];
-      state = Before<kDepth>(grid, bucket, place, p, d, d_depth, kept);
-    }
-    const bool alive = state.transmittance > 0;
+  for (int j = 0; j < kOwn; ++j) {
+    const bool alive = before[j].transmittance > 0;
     const unsigned group = __ballot_sync(kAll, alive) >> shift & ((1u << kLanes) - 1);
     if (alive) {
       const int to = count + __popc(group & ((1u << lane) - 1));
-      tile->d[kLanes + to] = {d.color.x, d.color.y, d.color.z, __int_as_float(p)};
-      tile->state[to] = {state.transmittance, state.behind};
-      if constexpr (kDepth) depths->d[kLanes + to] = d_depth;
+      float behind = d[j].total - Dot(before[j].color, d[j].color);
+      if constexpr (kDepth) {
+        const float d_depth = gradients.depth[pixels + j * kLanes];
+        behind -= kept.depth[place + j * kLanes] * d_depth;
+        depths->d[kLanes + to] = d_depth;
+      }
+      tile->d[kLanes + to] = {d[j].color.x, d[j].color.y, d[j].color.z,
+                              __int_as_float(lane + j * kLanes)};
+      tile->state[to] = {before[j].transmittance, behind};
     }
     count += __popc(group);
   }
@@ -147,6 +137,27 @@ __device__ void ClearAround(int count, int end, int lane, TileState* tile, TileD
   }
 }
 
+// A lane's splats, of which those from `end` on are seen nowhere, and their slots.
+__device__ void LoadSplats(const TileListsView& lists, const SplatRecord* record,
+                           const int32_t* first_slot, int column, int row, int entry, int end,
+                           TileSplat* splat, int32_t* slot) {
+  int32_t index[kOfLane], first[kOfLane];
+  SplatRecord own[kOfLane];
+#pragma unroll
+  for (int k = 0; k < kOfLane; ++k) index[k] = lists.splat[min(entry + k, end - 1)];
+#pragma unroll
+  for (int k = 0; k < kOfLane; ++k) {
+    own[k] = record[index[k]];
+    first[k] = first_slot[index[k]];
+  }
+#pragma unroll
+  for (int k = 0; k < kOfLane; ++k) {
+    splat[k] = TileSplat(own[k], column * kDeviceTile, row * kDeviceTile);
+    if (entry + k >= end) splat[k].lo = TileSplat().lo;
+    slot[k] = first[k] + SplatTiles(own[k], lists.grid).PlaceOf(column, row);
+  }
+}
+
 template <bool kDepth>
 __global__ void __launch_bounds__(kGroups* kLanes, kDepth ? 8 : ADJ_MIN)
     Adjoint(TileListsView lists, const SplatRecord* record, const int32_t* first_slot,
@@ -160,14 +171,15 @@ __global__ void __launch_bounds__(kGroups* kLanes, kDepth ? 8 : ADJ_MIN)
   const int64_t place = blockIdx.x * int64_t{kGroups} + group;
   const int num_buckets = *kept.num_buckets;
   if (blockIdx.x * int64_t{kGroups} >= num_buckets) return;
+  // Groups without a bucket do the last one again, and write nothing.
   const bool on = place < num_buckets;
-  const TileBucket bucket = on ? kept.bucket[place] : TileBucket{0, 0};
+  const TileBucket bucket = kept.bucket[min(place, int64_t{num_buckets - 1})];
   const TileGrid& grid = lists.grid;
   const int column = bucket.tile % grid.columns, row = bucket.tile / grid.columns;
-  const int first = lists.first[bucket.tile], end = on ? lists.end[bucket.tile] : 0;
+  const int first = lists.first[bucket.tile], end = lists.end[bucket.tile];
   const int count =
-      LoadPixels<kDepth>(grid, on, bucket, FirstCheckpoint(bucket.tile, first), lane, kept,
-                         gradients, tile, depths);
+      LoadPixels<kDepth>(bucket, FirstCheckpoint(bucket.tile, first), lane, kept, gradients,
+                         tile, depths);
   // All groups of a warp go as many steps.
   const int steps = __reduce_max_sync(kAll, count) + kLanes - 1;
   ClearAround<kDepth>(count, steps, lane, tile, depths);
@@ -175,12 +187,7 @@ __global__ void __launch_bounds__(kGroups* kLanes, kDepth ? 8 : ADJ_MIN)
   const int entry = first + bucket.bucket * kBucket + lane * kOfLane;
   TileSplat splat[kOfLane];
   Sums sum[kOfLane];
-#pragma unroll
-  for (int k = 0; k < kOfLane; ++k) {
-    if (entry + k < end)
-      splat[k] = TileSplat(record[lists.splat[entry + k]], column * kDeviceTile,
-                           row * kDeviceTile);
-  }
+  LoadSplats(lists, record, first_slot, column, row, entry, end, splat, tile->slot + lane * kOfLane);
   __syncwarp();
 
   PixelState state{0, 0};
@@ -201,11 +208,7 @@ __global__ void __launch_bounds__(kGroups* kLanes, kDepth ? 8 : ADJ_MIN)
   }
 #pragma unroll
   for (int k = 0; k < kOfLane; ++k)
-    if (entry + k < end) {
-      const int32_t index = lists.splat[entry + k];
-      const int slot = SplatTiles(record[index], grid).PlaceOf(column, row);
-      sums[int64_t{first_slot[index]} + slot] = sum[k].Unscaled();
-    }
+    if (on && entry + k < end) sums[tile->slot[lane * kOfLane + k]] = sum[k].Unscaled();
 }
 
 }  // namespace

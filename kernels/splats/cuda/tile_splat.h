@@ -1,6 +1,7 @@
 // A splat as the pixels of a tile see it, in numbers that make a pixel cheap. Device code only.
 #pragma once
 
+#include "kernels/splats/cuda/device_math.h"
 #include "kernels/splats/cuda/splat_record.h"
 
 #if defined(__CUDACC__)
@@ -8,7 +9,7 @@
 namespace regrade {
 
 // Offsets are whitened and scaled, w' = sqrt(log2(e) / 2) w, so that log2(alpha) = lo - |w'|^2.
-// Forward and adjoint call the same functions, of single IEEE operations: both decide alike.
+// Forward and adjoint call the same functions, of single operations: both decide alike.
 struct alignas(16) TileSplat {
   // At the tile's pixel (x, y): w'_0 = w0 + a x, w'_1 = w1 + ka x + b y.
   float a = 0, w0 = 0, ka = 0, w1 = 0;
@@ -21,9 +22,10 @@ struct alignas(16) TileSplat {
   __device__ TileSplat(const SplatRecord& r, int left, int top) : color(r.color), z(r.z) {
     const float dx = static_cast<float>(left + 0.5 - r.u);
     const float dy = static_cast<float>(top + 0.5 - r.v);
-    a = __fdiv_rn(kScale, r.c00);
-    b = __fdiv_rn(kScale, r.c11);
-    const float k = -__fdiv_rn(r.c10, r.c11);
+    const float inverse = FastReciprocal(r.c11);
+    a = __fmul_rn(kScale, FastReciprocal(r.c00));
+    b = __fmul_rn(kScale, inverse);
+    const float k = -__fmul_rn(r.c10, inverse);
     w0 = __fmul_rn(dx, a);
     ka = __fmul_rn(k, a);
     w1 = __fmaf_rn(k, w0, __fmul_rn(dy, b));
@@ -44,20 +46,6 @@ struct alignas(16) TileSplat {
 
   static constexpr float kScale = 0.8493218002880191f;  // sqrt(log2(e) / 2)
 };
-
-// 2^x to 2 units in the last place.
-__device__ inline float FastExp2(float x) {
-  float result;
-  asm("ex2.approx.ftz.f32 %0, %1;" : "=f"(result) : "f"(x));
-  return result;
-}
-
-// 1 / x to 1 unit in the last place.
-__device__ inline float FastReciprocal(float x) {
-  float result;
-  asm("rcp.approx.ftz.f32 %0, %1;" : "=f"(result) : "f"(x));
-  return result;
-}
 
 }  // namespace regrade
 
