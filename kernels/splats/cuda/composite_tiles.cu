@@ -83,13 +83,13 @@ __global__ void __launch_bounds__(32 * kWarps)
   Running two(inside && top + row + kApart < grid.height);
 
   const int first = lists.first[tile], end = lists.end[tile];
-  const int64_t checkpoint = FirstCheckpoint(tile, first);
+  const int32_t checkpoint = FirstCheckpoint(tile, first);
   int buckets = 0;
-  int32_t next = first + lane < end ? lists.splat[first + lane] : 0;
+  int32_t next = first + lane < end ? lists.entry[first + lane].splat : 0;
   for (int at = first; at < end; at += kBucket) {
     if (!__any_sync(kAll, one.running > 0 || two.running > 0)) break;
     if constexpr (kKeep) {
-      const int64_t place = (checkpoint + buckets) * kTilePixels + lane;
+      const int64_t place = int64_t{checkpoint + buckets} * kTilePixels + lane;
       Keep<kDepth>(one, place, kept);
       Keep<kDepth>(two, place + 32, kept);
     }
@@ -98,7 +98,7 @@ __global__ void __launch_bounds__(32 * kWarps)
     __syncwarp();
     if (lane < count) splats[lane] = TileSplat(record[next], left, top);
     __syncwarp();
-    if (at + kBucket + lane < end) next = lists.splat[at + kBucket + lane];
+    if (at + kBucket + lane < end) next = lists.entry[at + kBucket + lane].splat;
     for (int base = 0; base < count; base += kCheck) {
       const int stop = min(base + kCheck, count);
 #pragma unroll 4
@@ -121,13 +121,11 @@ __global__ void __launch_bounds__(32 * kWarps)
   if constexpr (kKeep) {
     if (buckets == 0) return;
     int at = 0;
-    if (lane == 0) {
-      at = atomicAdd(kept.num_buckets, buckets);
-      const int32_t last = lists.splat[min(first + buckets * kBucket, end) - 1];
-      kept.last[tile] = OrderOf(__float_as_uint(record[last].z), last);
-    }
+    if (lane == 0) at = atomicAdd(kept.num_buckets, buckets);
     at = __shfl_sync(kAll, at, 0);
-    for (int b = lane; b < buckets; b += 32) kept.bucket[at + b] = {tile, b};
+    for (int b = lane; b < buckets; b += 32)
+      kept.bucket[at + b] = {tile, first + b * kBucket, min(first + (b + 1) * kBucket, end),
+                             checkpoint + b};
   }
 }
 

@@ -23,25 +23,25 @@ struct alignas(16) PixelCheckpoint {
   Vec3f color;  // without the background
 };
 
-struct alignas(8) TileBucket {
-  int32_t tile, bucket;
+// The first bucket of a tile has the checkpoint FirstCheckpoint, and the others follow.
+struct alignas(16) TileBucket {
+  int32_t tile, first, end, checkpoint;  // entries [first, end)
 };
 
-// What is kept for the adjoint. Bucket b of a tile has the checkpoint FirstCheckpoint(tile) + b.
+// What is kept for the adjoint.
 struct KeptTiles {
   PixelCheckpoint* checkpoint = nullptr;  // [checkpoints, kTilePixels]
   float* depth = nullptr;                 // [checkpoints, kTilePixels]; or null: not kept
   TileBucket* bucket = nullptr;           // that some pixel of its tile reached, in any order
   int32_t* num_buckets = nullptr;         // must be 0 before
-  uint64_t* last = nullptr;               // [tiles]: OrderOf the last splat in such a bucket
 
   bool on() const { return checkpoint != nullptr; }
 };
 
-// Tiles have ceil(entries / kBucket) buckets, and no two the same number: ceil((f + n) / b) is
-// at most floor(f / b) + ceil(n / b) + 1.
-HD inline int64_t FirstCheckpoint(int tile, int32_t first_entry) {
-  return int64_t{first_entry} / kBucket + tile;
+// Tiles have ceil(entries / kBucket) buckets, and no two the same checkpoint: ceil((f + n) / b)
+// is at most floor(f / b) + ceil(n / b) + 1.
+HD inline int32_t FirstCheckpoint(int tile, int32_t first_entry) {
+  return first_entry / kBucket + tile;
 }
 inline int64_t NumCheckpoints(int64_t entries, int tiles) {
   return entries / kBucket + tiles + 1;

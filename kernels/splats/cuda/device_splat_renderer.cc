@@ -29,7 +29,7 @@ void DeviceSplatRenderer::Grow(int64_t count, const TileGrid& grid, SplatPass pa
 KeptTiles DeviceSplatRenderer::Kept() const {
   if (pass_ == SplatPass::kPicture) return {};
   return {checkpoint_.data(), pass_ == SplatPass::kAdjoint ? checkpoint_depth_.data() : nullptr,
-          bucket_.data(), num_buckets_.data(), last_.data()};
+          bucket_.data(), num_buckets_.data()};
 }
 
 void DeviceSplatRenderer::Render(const SplatsView<float>& splats, const Camera& camera,
@@ -55,7 +55,6 @@ void DeviceSplatRenderer::Render(const SplatsView<float>& splats, const Camera& 
       GrowBuffer(checkpoints * kTilePixels, "pixels between splats", &checkpoint_depth_);
     GrowBuffer(checkpoints, "buckets of splats", &bucket_);
     GrowBuffer(1, "number of buckets", &num_buckets_);
-    GrowBuffer(grid.count(), "ends of tiles", &last_);
     num_buckets_.Zero();
   }
   CompositeTiles(lists_.view(), record_.data(), splats.background, pixels_, Kept());
@@ -81,23 +80,29 @@ const SplatSumsView& DeviceSplatRenderer::SumPixels(const SplatPixels<const floa
   GrowBuffer(tiles * kTilePixels, "gradients of pixels", &pixel_gradient_);
   if (depth) GrowBuffer(tiles * kTilePixels, "gradients of pixels", &pixel_gradient_depth_);
   GrowBuffer(2 * tiles + 1, "gradients of a background", &background_);
-  GrowBuffer(num_entries(), "gradients of splats in tiles", &sums_);
+  GrowBuffer(view_.splats.count, "gradients of colours", &color_sums_);
+  // New slots have no stamp; after 2^32 pictures none may have an old one.
+  if (num_entries() > sums_.size() || ++stamp_ == 0) {
+    GrowBuffer(num_entries(), "gradients of splats in tiles", &sums_);
+    sums_.Zero();
+    stamp_ = 1;
+  }
   const TileGradients gradients{pixel_gradient_.data(),
                                 depth ? pixel_gradient_depth_.data() : nullptr,
                                 background_.data(), background_.data() + 2 * tiles};
   GatherPixelGradients(grid_, pixels_, d, gradients);
-  const int64_t buckets =
-      num_entries() == 0 ? 0 : NumCheckpoints(num_entries(), grid_.count());
-  AddTileAdjoints(lists_.view(), record_.data(), lists_.first_slot(), Kept(), buckets,
-                  gradients, sums_.data());
-  if (num_entries() > 0)
-    SumSlots({grid_, record_.data(), num_tiles_.data(), lists_.first_slot(), lists_.order(),
-              last_.data(), sums_.data()},
-             view_.splats.count);
+  if (num_entries() > 0) {
+    AddTileAdjoints(lists_.view(), record_.data(), Kept(),
+                    NumCheckpoints(num_entries(), grid_.count()), gradients, stamp_,
+                    sums_.data());
+    SumSlots(lists_.order(), num_tiles_.data(), lists_.first_slot(), view_.splats.count, stamp_,
+             sums_.data());
+  }
   view_.record = record_.data();
   view_.num_tiles = num_tiles_.data();
   view_.first_slot = lists_.first_slot();
   view_.sums = sums_.data();
+  view_.color = color_sums_.data();
   view_.d_background = gradients.d_background;
   return view_;
 }

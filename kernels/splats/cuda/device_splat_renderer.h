@@ -20,10 +20,10 @@ enum class SplatPass {
 };
 
 // Its memory is kept between calls, and grows by halves. In bytes:
-//   for each splat 88;
-//   for each entry (a splat in a tile of 8 x 8 pixels) 12, or 16 above 65536 tiles;
-//   with an adjoint 48 + 32 more for each entry, 40 for kAdjoint, and 1 KiB more for each tile;
-//   for each pixel 24, with an adjoint 16 or 20 more.
+//   for each splat 80, with an adjoint 24 more;
+//   for each entry (a splat in a tile of 8 x 8 pixels) 20, or 24 above 65536 tiles;
+//   with an adjoint 80.5 more for each entry, for kAdjoint 88.5;
+//   for each pixel 24, with an adjoint 32 or 40 more.
 //
 // Every call enqueues its work behind earlier work on the device. Render waits once, for the
 // number of entries. All results have the same bits for equal input.
@@ -67,11 +67,12 @@ class DeviceSplatRenderer {
   DeviceBuffer<float> checkpoint_depth_;
   DeviceBuffer<TileBucket> bucket_;
   DeviceBuffer<int32_t> num_buckets_;
-  DeviceBuffer<uint64_t> last_;
   DeviceBuffer<PixelGradient> pixel_gradient_;
   DeviceBuffer<float> pixel_gradient_depth_;
   DeviceBuffer<Vec3f> background_;
   DeviceBuffer<SlotSums> sums_;
+  DeviceBuffer<ColorSums> color_sums_;
+  uint32_t stamp_ = 0;  // of the last adjoint's slots
 };
 
 }  // namespace regrade

@@ -17,6 +17,11 @@
 
 namespace regrade {
 
+// d_sh of a splat is made of this: the harmonics of `direction` times d_color.
+struct ColorSums {
+  Vec3f direction, d_color;  // d_color: 0 where the colour is 0, see EQ(splat-color)
+};
+
 // Device pointers of what DeviceSplatRenderer leaves after SumPixels.
 struct SplatSumsView {
   SplatsView<float> splats;  // as they were rendered
@@ -26,6 +31,7 @@ struct SplatSumsView {
   const int32_t* num_tiles = nullptr;   // [splats]; 0: not seen
   const int32_t* first_slot = nullptr;  // [splats]
   const SlotSums* sums = nullptr;       // [slots]: a splat's sums are in its first slot
+  ColorSums* color = nullptr;           // [splats]: scratch
   const Vec3f* d_background = nullptr;  // [1]
 };
 
@@ -35,18 +41,8 @@ namespace splat_adjoint {
 
 constexpr int kBlock = 128;  // threads
 
-// What d_sh [3, basis] of a splat are products of.
 template <int kBasis>
-struct ColorGradient {
-  float gamma[kBasis];
-  Vec3f d_color;  // 0 where the colour is 0, see EQ(splat-color)
-
-  __device__ float operator[](int k) const { return d_color[k / kBasis] * gamma[k % kBasis]; }
-};
-
-template <int kBasis>
-__device__ Splat<float> AdjointOf(const SplatSumsView& view, int64_t i,
-                                  ColorGradient<kBasis>* by_color) {
+__device__ Splat<float> AdjointOf(const SplatSumsView& view, int64_t i) {
   const SlotSums slot = view.sums[view.first_slot[i]];
   SplatSums<float> sums;
   for (int a = 0; a < 2; ++a) sums.ellipse.h[a] = slot.h[a];
@@ -62,45 +58,51 @@ __device__ Splat<float> AdjointOf(const SplatSumsView& view, int64_t i,
   Splat<float> d{};
   float unused[3 * kBasis] = {};
   SeeSplatAdjoint(view.camera, view.options, own.view(), seen, sums, &d, unused);
-  float gamma[kBasis];
-  ShBasisTo3(kBasis, DirectionToMean(view.camera.center, own.values.mean).unit, gamma);
-  for (int k = 0; k < kBasis; ++k) by_color->gamma[k] = gamma[k];
-  for (int c = 0; c < 3; ++c)
-    by_color->d_color[c] = seen.color[c] > 0 ? sums.color[c] : 0.0f;
+  for (int c = 0; c < 3; ++c) sums.color[c] = seen.color[c] > 0 ? sums.color[c] : 0.0f;
+  view.color[i] = {DirectionToMean(view.camera.center, own.values.mean).unit, sums.color};
   return d;
 }
 
-// Hands out d_sh of `count` splats by neighbouring threads: rows of coefficients are long.
 template <int kBasis, typename Use>
-__device__ void UseColors(const ColorGradient<kBasis>* by_color, const uint16_t* list, int count,
-                          int64_t first, const Use& use) {
-  constexpr int kValues = 3 * kBasis, kParts = kValues % 4 == 0 ? 4 : 1;
-  constexpr int kOfSplat = kValues / kParts;
-  for (int part = static_cast<int>(threadIdx.x); part < count * kOfSplat; part += kBlock) {
-    const int k = part % kOfSplat * kParts;
-    const ColorGradient<kBasis>& own = by_color[part / kOfSplat];
-    float d[kParts];
-#pragma unroll
-    for (int p = 0; p < kParts; ++p) d[p] = own[k + p];
-    use.template Color<kParts>(kValues * (first + list[part / kOfSplat]) + k, k, d);
+__global__ void __launch_bounds__(kBlock, 4) UseShapes(SplatSumsView view, Use use) {
+  using List = SeenList<kBlock>;
+  __shared__ uint16_t list[List::kChunk];
+  const int total = List::Make(view.num_tiles, view.splats.count, list);
+  for (int k = static_cast<int>(threadIdx.x); k < total; k += kBlock) {
+    const int64_t i = List::First() + list[k];
+    use.Shape(i, AdjointOf<kBasis>(view, i));
   }
 }
 
+// Neighbouring threads have neighbouring coefficients: a splat's row of them is long.
 template <int kBasis, typename Use>
-__global__ void __launch_bounds__(kBlock, 4) UseGradients(SplatSumsView view, Use use) {
+__global__ void __launch_bounds__(kBlock) UseColors(SplatSumsView view, Use use) {
   using List = SeenList<kBlock>;
+  constexpr int kValues = 3 * kBasis, kParts = kValues % 4 == 0 ? 4 : 1;
+  constexpr int kOfSplat = kValues / kParts;
   __shared__ uint16_t list[List::kChunk];
-  __shared__ alignas(16) char shared[kBlock * sizeof(ColorGradient<kBasis>)];
-  auto* const by_color = reinterpret_cast<ColorGradient<kBasis>*>(shared);
+  __shared__ float gamma[kBlock][kBasis], d_color[kBlock][3];
   const int total = List::Make(view.num_tiles, view.splats.count, list);
+  const int thread = static_cast<int>(threadIdx.x);
   for (int begin = 0; begin < total; begin += kBlock) {
-    const int count = min(kBlock, total - begin), thread = static_cast<int>(threadIdx.x);
+    const int count = min(kBlock, total - begin);
     if (thread < count) {
-      const int64_t i = List::First() + list[begin + thread];
-      use.Shape(i, AdjointOf(view, i, by_color + thread));
+      const ColorSums own = view.color[List::First() + list[begin + thread]];
+      float harmonics[kBasis];
+      ShBasisTo3(kBasis, own.direction, harmonics);
+      for (int k = 0; k < kBasis; ++k) gamma[thread][k] = harmonics[k];
+      for (int c = 0; c < 3; ++c) d_color[thread][c] = own.d_color[c];
     }
     __syncthreads();
-    UseColors(by_color, list + begin, count, List::First(), use);
+    for (int part = thread; part < count * kOfSplat; part += kBlock) {
+      const int place = part / kOfSplat, first = part % kOfSplat * kParts;
+      float d[kParts];
+#pragma unroll
+      for (int p = 0; p < kParts; ++p)
+        d[p] = d_color[place][(first + p) / kBasis] * gamma[place][(first + p) % kBasis];
+      const int64_t i = List::First() + list[begin + place];
+      use.template Color<kParts>(kValues * i + first, first, d);
+    }
     __syncthreads();
   }
 }
@@ -115,15 +117,16 @@ __global__ void __launch_bounds__(kBlock, 4) UseGradients(SplatSumsView view, Us
 //     of the coefficients sh[at], ..., sh[at + kCount - 1], which are k, k + 1 ... of the
 //     [3, basis] of their splat. kCount is 4 for a basis of 4 or 16, with `at` a multiple of 4,
 //     and otherwise 1.
-// The values of a splat are read before its gradients are handed out, and by no other splat's
-// thread: `use` may change the values whose gradient it has. The same bits in every run.
+// All of a splat's values are read before any of its gradients is handed out, and by no other
+// splat's thread: `use` may change the values whose gradient it has. The same bits in every run.
 template <typename Use>
 void UseSplatGradients(const SplatSumsView& view, const Use& use) {
   using namespace splat_adjoint;
   if (view.splats.count == 0) return;
   BySplatBasis(view.splats.basis, [&](auto basis) {
-    UseGradients<basis(), Use>
-        <<<SeenList<kBlock>::Blocks(view.splats.count), kBlock, 0, LaunchStream()>>>(view, use);
+    const unsigned blocks = SeenList<kBlock>::Blocks(view.splats.count);
+    UseShapes<basis(), Use><<<blocks, kBlock, 0, LaunchStream()>>>(view, use);
+    UseColors<basis(), Use><<<blocks, kBlock, 0, LaunchStream()>>>(view, use);
   });
   CheckLaunch("use_splat_gradients");
 }

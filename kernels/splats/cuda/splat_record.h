@@ -33,11 +33,6 @@ struct TileGrid {
   HD int count() const { return columns * rows; }
 };
 
-// The order of splats at a pixel as one number: by z, which is positive, then by index.
-HD inline uint64_t OrderOf(uint32_t z_bits, int32_t index) {
-  return uint64_t{z_bits} << 32 | static_cast<uint32_t>(index);
-}
-
 #if defined(__CUDACC__)
 
 // Columns of tiles in a row of tiles.
@@ -53,7 +48,7 @@ struct TileSpan {
 //
 // Wider than the ellipse by some roundings, and never narrower: a tile too many does no harm.
 // All arithmetic is of single operations, which compilers do not merge: every kernel finds the
-// same tiles, and so the same slot for each of them.
+// same tiles.
 class SplatTiles {
  public:
   __device__ SplatTiles(const SplatRecord& r, const TileGrid& grid) : columns_(grid.columns) {
@@ -105,16 +100,6 @@ class SplatTiles {
       count += span.end - span.begin;
     }
     return count;
-  }
-
-  // The place of a tile that is met among all of them, by rows.
-  __device__ int PlaceOf(int column, int row) const {
-    int place = column - Row(row).begin;
-    for (int above = first_row_; above < row; ++above) {
-      const TileSpan span = Row(above);
-      place += span.end - span.begin;
-    }
-    return place;
   }
 
   // Calls visit(tile, place) for all tiles by one thread.

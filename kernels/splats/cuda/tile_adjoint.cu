@@ -20,13 +20,13 @@ namespace regrade {
 
 namespace {
 
-#ifndef ADJ_MIN
-#define ADJ_MIN 9
+#ifndef ADJ_LANES
+#define ADJ_LANES 8
 #endif
 constexpr unsigned kAll = 0xFFFFFFFF;
-constexpr int kLanes = 8;                  // of a bucket
+constexpr int kLanes = ADJ_LANES;                  // of a bucket
 constexpr int kOfLane = kBucket / kLanes;  // splats of a lane
-constexpr int kGroups = 8;                 // buckets of a block
+constexpr int kGroups = 64 / kLanes;                 // buckets of a block
 
 struct PixelState {
   float transmittance;  // 0: ended
@@ -38,7 +38,6 @@ struct PixelState {
 struct alignas(16) TileState {
   float4 d[kLanes + kTilePixels + kLanes];  // d_C; the pixel's number in the tile, as bits
   float2 state[kTilePixels + kLanes];
-  int32_t slot[kBucket];
 };
 struct TileDepths {
   float d[kLanes + kTilePixels + kLanes];  // d_Z
@@ -80,22 +79,23 @@ struct Sums {
     if constexpr (kDepth) z = fmaf(weight, d_depth, z);
   }
 
-  __device__ SlotSums Unscaled() const {
+  __device__ SlotSums Unscaled(uint32_t stamp) const {
     constexpr float k = 1 / TileSplat::kScale;
-    return {{h0 * k, h1 * k}, {h00 * k * k, h01 * k * k, h11 * k * k}, f, {red, green, blue}, z};
+    return {{h0 * k, h1 * k}, {h00 * k * k, h01 * k * k, h11 * k * k}, f, {red, green, blue}, z,
+            stamp};
   }
 };
 
 // Lane l loads the pixels l, l + kLanes ... of its group's bucket; returns how many the tile has
 // that have not ended. Called by whole warps. All loads come first, so that they overlap.
 template <bool kDepth>
-__device__ int LoadPixels(const TileBucket& bucket, int64_t checkpoint, int lane,
-                          const KeptTiles& kept, const TileGradients& gradients,
-                          TileState* tile, TileDepths* depths) {
+__device__ int LoadPixels(const TileBucket& bucket, int lane, const KeptTiles& kept,
+                          const TileGradients& gradients, TileState* tile,
+                          TileDepths* depths) {
   constexpr int kOwn = kTilePixels / kLanes;
   const int shift = static_cast<int>(threadIdx.x % 32) - lane;
   const int64_t pixels = int64_t{bucket.tile} * kTilePixels + lane;
-  const int64_t place = (checkpoint + bucket.bucket) * kTilePixels + lane;
+  const int64_t place = int64_t{bucket.checkpoint} * kTilePixels + lane;
   PixelGradient d[kOwn];
   PixelCheckpoint before[kOwn];
 #pragma unroll
@@ -137,31 +137,10 @@ __device__ void ClearAround(int count, int end, int lane, TileState* tile, TileD
   }
 }
 
-// A lane's splats, of which those from `end` on are seen nowhere, and their slots.
-__device__ void LoadSplats(const TileListsView& lists, const SplatRecord* record,
-                           const int32_t* first_slot, int column, int row, int entry, int end,
-                           TileSplat* splat, int32_t* slot) {
-  int32_t index[kOfLane], first[kOfLane];
-  SplatRecord own[kOfLane];
-#pragma unroll
-  for (int k = 0; k < kOfLane; ++k) index[k] = lists.splat[min(entry + k, end - 1)];
-#pragma unroll
-  for (int k = 0; k < kOfLane; ++k) {
-    own[k] = record[index[k]];
-    first[k] = first_slot[index[k]];
-  }
-#pragma unroll
-  for (int k = 0; k < kOfLane; ++k) {
-    splat[k] = TileSplat(own[k], column * kDeviceTile, row * kDeviceTile);
-    if (entry + k >= end) splat[k].lo = TileSplat().lo;
-    slot[k] = first[k] + SplatTiles(own[k], lists.grid).PlaceOf(column, row);
-  }
-}
-
 template <bool kDepth>
-__global__ void __launch_bounds__(kGroups* kLanes, kDepth ? 8 : ADJ_MIN)
-    Adjoint(TileListsView lists, const SplatRecord* record, const int32_t* first_slot,
-            KeptTiles kept, TileGradients gradients, SlotSums* sums) {
+__global__ void __launch_bounds__(kGroups* kLanes, kLanes == 8 ? (kDepth ? 8 : 9) : 14)
+    Adjoint(TileListsView lists, const SplatRecord* record, KeptTiles kept,
+            TileGradients gradients, uint32_t stamp, SlotSums* sums) {
   __shared__ alignas(16) char shared[kGroups * sizeof(TileState)];
   __shared__ TileDepths all_depths[kDepth ? kGroups : 1];
   const int group = static_cast<int>(threadIdx.x) / kLanes;
@@ -174,20 +153,24 @@ __global__ void __launch_bounds__(kGroups* kLanes, kDepth ? 8 : ADJ_MIN)
   // Groups without a bucket do the last one again, and write nothing.
   const bool on = place < num_buckets;
   const TileBucket bucket = kept.bucket[min(place, int64_t{num_buckets - 1})];
-  const TileGrid& grid = lists.grid;
-  const int column = bucket.tile % grid.columns, row = bucket.tile / grid.columns;
-  const int first = lists.first[bucket.tile], end = lists.end[bucket.tile];
-  const int count =
-      LoadPixels<kDepth>(bucket, FirstCheckpoint(bucket.tile, first), lane, kept, gradients,
-                         tile, depths);
+  const int first = bucket.first + lane * kOfLane;
+  SplatRecord own[kOfLane];
+#pragma unroll
+  for (int k = 0; k < kOfLane; ++k)
+    own[k] = record[lists.entry[min(first + k, bucket.end - 1)].splat];
+  const int count = LoadPixels<kDepth>(bucket, lane, kept, gradients, tile, depths);
   // All groups of a warp go as many steps.
   const int steps = __reduce_max_sync(kAll, count) + kLanes - 1;
   ClearAround<kDepth>(count, steps, lane, tile, depths);
-
-  const int entry = first + bucket.bucket * kBucket + lane * kOfLane;
+  const int left = bucket.tile % lists.grid.columns * kDeviceTile;
+  const int top = bucket.tile / lists.grid.columns * kDeviceTile;
   TileSplat splat[kOfLane];
   Sums sum[kOfLane];
-  LoadSplats(lists, record, first_slot, column, row, entry, end, splat, tile->slot + lane * kOfLane);
+#pragma unroll
+  for (int k = 0; k < kOfLane; ++k) {
+    splat[k] = TileSplat(own[k], left, top);
+    if (first + k >= bucket.end) splat[k].lo = TileSplat().lo;
+  }
   __syncwarp();
 
   PixelState state{0, 0};
@@ -208,29 +191,30 @@ __global__ void __launch_bounds__(kGroups* kLanes, kDepth ? 8 : ADJ_MIN)
   }
 #pragma unroll
   for (int k = 0; k < kOfLane; ++k)
-    if (on && entry + k < end) sums[tile->slot[lane * kOfLane + k]] = sum[k].Unscaled();
+    if (on && first + k < bucket.end)
+      sums[lists.entry[first + k].slot] = sum[k].Unscaled(stamp);
 }
 
 }  // namespace
 
 void AddTileAdjoints(const TileListsView& lists, const SplatRecord* record,
-                     const int32_t* first_slot, const KeptTiles& kept, int64_t max_buckets,
-                     const TileGradients& gradients, SlotSums* sums) {
+                     const KeptTiles& kept, int64_t max_buckets, const TileGradients& gradients,
+                     uint32_t stamp, SlotSums* sums) {
   const unsigned blocks = static_cast<unsigned>((max_buckets + kGroups - 1) / kGroups);
   if (blocks == 0) return;
   if (gradients.depth != nullptr)
     Adjoint<true><<<blocks, kGroups * kLanes, 0, LaunchStream()>>>(
-        lists, record, first_slot, kept, gradients, sums);
+        lists, record, kept, gradients, stamp, sums);
   else
     Adjoint<false><<<blocks, kGroups * kLanes, 0, LaunchStream()>>>(
-        lists, record, first_slot, kept, gradients, sums);
+        lists, record, kept, gradients, stamp, sums);
   CheckLaunch("add_tile_adjoints");
 }
 
 #else
 
-void AddTileAdjoints(const TileListsView&, const SplatRecord*, const int32_t*, const KeptTiles&,
-                     int64_t, const TileGradients&, SlotSums*) {
+void AddTileAdjoints(const TileListsView&, const SplatRecord*, const KeptTiles&, int64_t,
+                     const TileGradients&, uint32_t, SlotSums*) {
   DeviceWait("splats");
 }
 

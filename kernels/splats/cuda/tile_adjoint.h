@@ -13,13 +13,14 @@ struct alignas(16) SlotSums {
   float h[2], H[3], f;
   Vec3f color;
   float z;
+  uint32_t stamp;
 };
 
-// sums [slots] of the splats up to `kept.last` of their tiles; others are not written.
+// sums [slots] of the splats in the kept buckets, marked by `stamp`; others are not written.
 // `max_buckets`: at least the number of kept buckets. The results have the same bits in every
 // run: no sum depends on the order in which threads run.
 void AddTileAdjoints(const TileListsView& lists, const SplatRecord* record,
-                     const int32_t* first_slot, const KeptTiles& kept, int64_t max_buckets,
-                     const TileGradients& gradients, SlotSums* sums);
+                     const KeptTiles& kept, int64_t max_buckets, const TileGradients& gradients,
+                     uint32_t stamp, SlotSums* sums);
 
 }  // namespace regrade

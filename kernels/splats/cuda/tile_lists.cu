@@ -40,7 +40,7 @@ template <typename Key>
 __global__ void __launch_bounds__(kEntryThreads)
     MakeEntries(const int32_t* order, const int64_t* offset, int64_t n,
                 const SplatRecord* record, TileGrid grid, int32_t* first_slot, Key* key,
-                int32_t* entry) {
+                TileEntry* entry) {
   __shared__ uint32_t staged[kEntryThreads / 32][kStaged];  // tile, lane of the splat
   uint32_t* const stage = staged[threadIdx.x / 32];
   const int lane = static_cast<int>(threadIdx.x % 32);
@@ -60,7 +60,7 @@ __global__ void __launch_bounds__(kEntryThreads)
         stage[start + place] = static_cast<uint32_t>(tile) << 5 | static_cast<uint32_t>(lane);
       } else {
         key[first + place] = static_cast<Key>(tile);
-        entry[first + place] = splat;
+        entry[first + place] = {splat, static_cast<int32_t>(first) + place};
       }
     });
   if (in_stage) {
@@ -72,7 +72,7 @@ __global__ void __launch_bounds__(kEntryThreads)
       const int32_t its = __shfl_sync(kAll, splat, static_cast<int>(made & 31));
       if (at >= total) continue;
       key[begin_of_warp + at] = static_cast<Key>(made >> 5);
-      entry[begin_of_warp + at] = its;
+      entry[begin_of_warp + at] = {its, static_cast<int32_t>(begin_of_warp) + at};
     }
     return;
   }
@@ -82,7 +82,7 @@ __global__ void __launch_bounds__(kEntryThreads)
     const int64_t from = __shfl_sync(kAll, first, source);
     SplatTiles(record[shared], grid).ForAllByWarp([&](int tile, int place) {
       key[from + place] = static_cast<Key>(tile);
-      entry[from + place] = shared;
+      entry[from + place] = {shared, static_cast<int32_t>(from) + place};
     });
   }
 }
@@ -123,9 +123,9 @@ void WithScratch(DeviceBuffer<uint8_t>* scratch, const Function& function) {
 }
 
 // The sorted values are in values->Current().
-template <typename Key>
+template <typename Key, typename Value>
 void Sort(int64_t count, int end_bit, cub::DoubleBuffer<Key>* keys,
-          cub::DoubleBuffer<int32_t>* values, DeviceBuffer<uint8_t>* scratch) {
+          cub::DoubleBuffer<Value>* values, DeviceBuffer<uint8_t>* scratch) {
   WithScratch(scratch, [&](void* memory, size_t& bytes) {
     cub::DeviceRadixSort::SortPairs(memory, bytes, *keys, *values, static_cast<int>(count), 0,
                                     end_bit, LaunchStream());
@@ -167,7 +167,7 @@ void TileLists::Make(const SeenSplats& seen, int64_t count, const TileGrid& grid
 
   GrowBuffer(num_entries_, "splats of tiles", &entries_);
   GrowBuffer(num_entries_, "splats of tiles", &other_entries_);
-  cub::DoubleBuffer<int32_t> entries(entries_.data(), other_entries_.data());
+  cub::DoubleBuffer<TileEntry> entries(entries_.data(), other_entries_.data());
   const auto with_keys = [&](auto zero) {
     using Key = decltype(zero);
     // Both arrays begin at a multiple of 256 bytes.
@@ -190,7 +190,7 @@ void TileLists::Make(const SeenSplats& seen, int64_t count, const TileGrid& grid
     with_keys(uint16_t{});
   else
     with_keys(uint32_t{});
-  view_.splat = entries.Current();
+  view_.entry = entries.Current();
 }
 
 #else

@@ -10,15 +10,20 @@
 
 namespace regrade {
 
+// A splat in a tile, and the entry's number in the order of splats, then of tiles by rows.
+struct alignas(8) TileEntry {
+  int32_t splat, slot;
+};
+
 // Device pointers.
 struct TileListsView {
   TileGrid grid;
-  const int32_t* splat = nullptr;  // [entries], by tile, then front to back: index of a splat
-  const int32_t* first = nullptr;  // [tiles]
-  const int32_t* end = nullptr;    // [tiles]
+  const TileEntry* entry = nullptr;  // [entries], by tile, then front to back
+  const int32_t* first = nullptr;    // [tiles]
+  const int32_t* end = nullptr;      // [tiles]
 };
 
-// 28 bytes for each splat and, with up to 65536 tiles, 12 for each entry, and those of a sort.
+// 20 bytes for each splat and, with up to 65536 tiles, 20 for each entry, and those of a sort.
 class TileLists {
  public:
   // `seen`: of `count` splats; its z_bits and index are overwritten. Waits for the device once.
@@ -27,8 +32,7 @@ class TileLists {
 
   int64_t num_entries() const { return num_entries_; }
   TileListsView view() const { return view_; }
-  // [splats] A splat's entries by rows of tiles have the slots from this one on; undefined for
-  // splats without tiles.
+  // [splats] The least slot of a splat; undefined for splats without tiles.
   const int32_t* first_slot() const { return first_slot_.data(); }
   // [splats] Splats in the order of their slots, those without tiles last.
   const int32_t* order() const { return order_; }
@@ -37,8 +41,9 @@ class TileLists {
   DeviceBuffer<uint32_t> z_bits_;
   DeviceBuffer<int32_t> index_, first_slot_;
   DeviceBuffer<int64_t> offset_;
-  DeviceBuffer<uint8_t> tile_keys_;       // two arrays of 2 or 4 bytes
-  DeviceBuffer<int32_t> entries_, other_entries_, ranges_;
+  DeviceBuffer<uint8_t> tile_keys_;  // two arrays of 2 or 4 bytes
+  DeviceBuffer<TileEntry> entries_, other_entries_;
+  DeviceBuffer<int32_t> ranges_;
   DeviceBuffer<uint8_t> scratch_;
   const int32_t* order_ = nullptr;
   int64_t num_entries_ = 0;
