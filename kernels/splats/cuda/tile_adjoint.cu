@@ -14,12 +14,19 @@
 #include "kernels/splats/cuda/tile_splat.h"
 #include "kernels/splats/splat_camera.h"
 
+#if defined(__CUDACC__)
+#include <cuda_pipeline.h>
+#endif
+
 namespace regrade {
 
 #if defined(__CUDACC__)
 
 namespace {
 
+#ifndef ADJ_BLOCKS
+#define ADJ_BLOCKS 9
+#endif
 #ifndef ADJ_LANES
 #define ADJ_LANES 8
 #endif
@@ -37,7 +44,8 @@ struct PixelState {
 // are what lanes add in steps without a pixel.
 struct alignas(16) TileState {
   float4 d[kLanes + kTilePixels + kLanes];  // d_C; the pixel's number in the tile, as bits
-  float2 state[kTilePixels + kLanes];
+  float4 state[kTilePixels + kLanes];       // T_i, b_i
+  int32_t slot[kBucket];                    // of the splats
 };
 struct TileDepths {
   float d[kLanes + kTilePixels + kLanes];  // d_Z
@@ -86,39 +94,44 @@ struct Sums {
   }
 };
 
-// Lane l loads the pixels l, l + kLanes ... of its group's bucket; returns how many the tile has
-// that have not ended. Called by whole warps. All loads come first, so that they overlap.
-template <bool kDepth>
-__device__ int LoadPixels(const TileBucket& bucket, int lane, const KeptTiles& kept,
-                          const TileGradients& gradients, TileState* tile,
-                          TileDepths* depths) {
-  constexpr int kOwn = kTilePixels / kLanes;
-  const int shift = static_cast<int>(threadIdx.x % 32) - lane;
-  const int64_t pixels = int64_t{bucket.tile} * kTilePixels + lane;
-  const int64_t place = int64_t{bucket.checkpoint} * kTilePixels + lane;
-  PixelGradient d[kOwn];
-  PixelCheckpoint before[kOwn];
+// Begins to copy the gradients of a tile's pixels to tile->d, and the pixels as they were before
+// the bucket to tile->state.
+__device__ void BeginToLoad(const TileBucket& bucket, int lane, const KeptTiles& kept,
+                            const TileGradients& gradients, TileState* tile) {
+  const int64_t pixels = int64_t{bucket.tile} * kTilePixels;
+  const int64_t place = int64_t{bucket.checkpoint} * kTilePixels;
 #pragma unroll
-  for (int j = 0; j < kOwn; ++j) {
-    d[j] = gradients.pixel[pixels + j * kLanes];
-    before[j] = kept.checkpoint[place + j * kLanes];
+  for (int p = lane; p < kTilePixels; p += kLanes) {
+    __pipeline_memcpy_async(tile->d + kLanes + p, gradients.pixel + pixels + p, 16);
+    __pipeline_memcpy_async(tile->state + p, kept.checkpoint + place + p, 16);
   }
+  __pipeline_commit();
+}
+
+// Moves what was copied to the places of TileState, without pixels that have ended; returns how
+// many are left. Called by whole warps.
+template <bool kDepth>
+__device__ int KeepAlive(const TileBucket& bucket, int lane, const KeptTiles& kept,
+                         const TileGradients& gradients, TileState* tile, TileDepths* depths) {
+  const int shift = static_cast<int>(threadIdx.x % 32) - lane;
   int count = 0;
 #pragma unroll
-  for (int j = 0; j < kOwn; ++j) {
-    const bool alive = before[j].transmittance > 0;
+  for (int j = 0; j < kTilePixels / kLanes; ++j) {
+    const int p = lane + j * kLanes;  // not before any place that is written
+    const float4 d = tile->d[kLanes + p], before = tile->state[p];
+    const bool alive = before.x > 0;
     const unsigned group = __ballot_sync(kAll, alive) >> shift & ((1u << kLanes) - 1);
+    __syncwarp();
     if (alive) {
       const int to = count + __popc(group & ((1u << lane) - 1));
-      float behind = d[j].total - Dot(before[j].color, d[j].color);
+      float behind = d.w - (before.y * d.x + before.z * d.y + before.w * d.z);
       if constexpr (kDepth) {
-        const float d_depth = gradients.depth[pixels + j * kLanes];
-        behind -= kept.depth[place + j * kLanes] * d_depth;
+        const float d_depth = gradients.depth[int64_t{bucket.tile} * kTilePixels + p];
+        behind -= kept.depth[int64_t{bucket.checkpoint} * kTilePixels + p] * d_depth;
         depths->d[kLanes + to] = d_depth;
       }
-      tile->d[kLanes + to] = {d[j].color.x, d[j].color.y, d[j].color.z,
-                              __int_as_float(lane + j * kLanes)};
-      tile->state[to] = {before[j].transmittance, behind};
+      tile->d[kLanes + to] = {d.x, d.y, d.z, __int_as_float(p)};
+      tile->state[to] = {before.x, behind, 0, 0};
     }
     count += __popc(group);
   }
@@ -132,13 +145,13 @@ __device__ void ClearAround(int count, int end, int lane, TileState* tile, TileD
   if constexpr (kDepth) depths->d[lane] = 0;
   for (int p = count + lane; p < end; p += kLanes) {
     tile->d[kLanes + p] = zero;
-    tile->state[p] = {0, 0};
+    tile->state[p] = zero;
     if constexpr (kDepth) depths->d[kLanes + p] = 0;
   }
 }
 
 template <bool kDepth>
-__global__ void __launch_bounds__(kGroups* kLanes, kLanes == 8 ? (kDepth ? 8 : 9) : 14)
+__global__ void __launch_bounds__(kGroups* kLanes, kLanes == 8 ? ADJ_BLOCKS : 14)
     Adjoint(TileListsView lists, const SplatRecord* record, KeptTiles kept,
             TileGradients gradients, uint32_t stamp, SlotSums* sums) {
   __shared__ alignas(16) char shared[kGroups * sizeof(TileState)];
@@ -154,14 +167,16 @@ __global__ void __launch_bounds__(kGroups* kLanes, kLanes == 8 ? (kDepth ? 8 : 9
   const bool on = place < num_buckets;
   const TileBucket bucket = kept.bucket[min(place, int64_t{num_buckets - 1})];
   const int first = bucket.first + lane * kOfLane;
+  BeginToLoad(bucket, lane, kept, gradients, tile);
+  TileEntry entry[kOfLane];
   SplatRecord own[kOfLane];
 #pragma unroll
-  for (int k = 0; k < kOfLane; ++k)
-    own[k] = record[lists.entry[min(first + k, bucket.end - 1)].splat];
-  const int count = LoadPixels<kDepth>(bucket, lane, kept, gradients, tile, depths);
-  // All groups of a warp go as many steps.
-  const int steps = __reduce_max_sync(kAll, count) + kLanes - 1;
-  ClearAround<kDepth>(count, steps, lane, tile, depths);
+  for (int k = 0; k < kOfLane; ++k) entry[k] = lists.entry[min(first + k, bucket.end - 1)];
+#pragma unroll
+  for (int k = 0; k < kOfLane; ++k) {
+    own[k] = record[entry[k].splat];
+    tile->slot[lane * kOfLane + k] = entry[k].slot;
+  }
   const int left = bucket.tile % lists.grid.columns * kDeviceTile;
   const int top = bucket.tile / lists.grid.columns * kDeviceTile;
   TileSplat splat[kOfLane];
@@ -171,6 +186,15 @@ __global__ void __launch_bounds__(kGroups* kLanes, kLanes == 8 ? (kDepth ? 8 : 9
     splat[k] = TileSplat(own[k], left, top);
     if (first + k >= bucket.end) splat[k].lo = TileSplat().lo;
   }
+  __pipeline_wait_prior(0);
+  __syncwarp();
+  const int count = KeepAlive<kDepth>(bucket, lane, kept, gradients, tile, depths);
+  // All groups of a warp go as many steps.
+  int most = count;
+  for (int other = kLanes; other < 32; other *= 2)
+    most = max(most, __shfl_xor_sync(kAll, most, other));
+  const int steps = most + kLanes - 1;
+  ClearAround<kDepth>(count, steps, lane, tile, depths);
   __syncwarp();
 
   PixelState state{0, 0};
@@ -179,7 +203,7 @@ __global__ void __launch_bounds__(kGroups* kLanes, kLanes == 8 ? (kDepth ? 8 : 9
   for (int step = 0; step < steps; ++step) {
     state.transmittance = __shfl_up_sync(kAll, state.transmittance, 1, kLanes);
     state.behind = __shfl_up_sync(kAll, state.behind, 1, kLanes);
-    const float2 entering = tile->state[step];
+    const float2 entering = *reinterpret_cast<const float2*>(tile->state + step);
     if (lane == 0) state = {entering.x, entering.y};
     const float4 d = d_pixel[step];
     const unsigned pixel = __float_as_uint(d.w);
@@ -192,7 +216,7 @@ __global__ void __launch_bounds__(kGroups* kLanes, kLanes == 8 ? (kDepth ? 8 : 9
 #pragma unroll
   for (int k = 0; k < kOfLane; ++k)
     if (on && first + k < bucket.end)
-      sums[lists.entry[first + k].slot] = sum[k].Unscaled(stamp);
+      sums[tile->slot[lane * kOfLane + k]] = sum[k].Unscaled(stamp);
 }
 
 }  // namespace
