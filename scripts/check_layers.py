@@ -41,6 +41,7 @@ LAYERS = {
     "kernels/field/cuda": 3,
     "kernels/splats": 3,
     "kernels/splats/cpu": 4,
+    "kernels/splats/cuda": 4,
     "reconstruct/scene": 0,
     "reconstruct/colmap": 1,
     "reconstruct/fit": 1,
