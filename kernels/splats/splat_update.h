@@ -41,6 +41,11 @@ struct SplatUpdate {
   float beta1 = 0.9f, beta2 = 0.999f, epsilon = 1e-15f;
   float inverse_correction1 = 1, inverse_correction2 = 1;
 
+  HD void Step(float gradient, float rate, float* value, float* first, float* second) const {
+    AdamUpdate(gradient, beta1, beta2, epsilon, rate * inverse_correction1,
+               inverse_correction2, value, first, second);
+  }
+
   void SetStep(uint64_t number) {
     step = number;
     const int64_t t = static_cast<int64_t>(number) + 1;
@@ -88,54 +93,49 @@ HD inline void AddSplatNoise(const SplatUpdate& update, int64_t i, const Splat<f
   for (int a = 0; a < 3; ++a) mean[a] += offset[a];
 }
 
-// Steps splat i by the gradient d, d_sh [3, basis] of the picture's loss. A gradient that is not
-// finite, or whose square is not, changes nothing of the splat, and the result is false.
-HD inline bool UpdateSplat(const SplatUpdate& update, int64_t i, int basis,
-                           const Splat<float>& d, const float* d_sh, const SplatMoments& to) {
+// Steps everything but the colour of splat i by the gradient d of the picture's loss. A gradient
+// that is not finite, or whose square is not, changes nothing, and the result is false.
+HD inline bool UpdateShape(const SplatUpdate& update, int64_t i, const Splat<float>& d,
+                           const SplatMoments& to) {
   using std::abs, std::exp;
   float sum = abs(d.opacity_logit);
   for (int a = 0; a < 3; ++a) sum += abs(d.mean[a]) + abs(d.log_scale[a]);
   for (int a = 0; a < 4; ++a) sum += abs(d.quaternion[a]);
-  for (int k = 0; k < 3 * basis; ++k) sum += abs(d_sh[k]);
   if (!(sum < kLargestGradient)) return false;
-  const auto step = [&](float gradient, float rate, float* value, float* first, float* second) {
-    AdamUpdate(gradient, update.beta1, update.beta2, update.epsilon,
-               rate * update.inverse_correction1, update.inverse_correction2, value, first,
-               second);
+  const auto step = [&](float gradient, float rate, int64_t k, float* SplatPointers::*of) {
+    update.Step(gradient, rate, to.value.*of + k, to.first.*of + k, to.second.*of + k);
   };
   const SplatRates& rates = update.rates;
-  const float logit = to.value.opacity_logit[i];
-  const float opacity = exp(LogSigmoid(logit));
+  const float opacity = exp(LogSigmoid(to.value.opacity_logit[i]));
   step(d.opacity_logit + update.opacity_weight * opacity * (1 - opacity), rates.opacity_logit,
-       &to.value.opacity_logit[i], &to.first.opacity_logit[i], &to.second.opacity_logit[i]);
-  for (int64_t k = 3 * i; k < 3 * i + 3; ++k) {
-    const int a = static_cast<int>(k - 3 * i);
+       i, &SplatPointers::opacity_logit);
+  for (int a = 0; a < 3; ++a) {
+    const int64_t k = 3 * i + a;
     const float log_scale = to.value.log_scale[k];
     const float scale = exp(log_scale < 20.0f ? log_scale : 20.0f) * LogScaleCounts(log_scale);
-    step(d.mean[a], rates.mean, &to.value.mean[k], &to.first.mean[k], &to.second.mean[k]);
-    step(d.log_scale[a] + update.scale_weight * scale, rates.log_scale, &to.value.log_scale[k],
-         &to.first.log_scale[k], &to.second.log_scale[k]);
+    step(d.mean[a], rates.mean, k, &SplatPointers::mean);
+    step(d.log_scale[a] + update.scale_weight * scale, rates.log_scale, k,
+         &SplatPointers::log_scale);
   }
-  for (int64_t k = 4 * i; k < 4 * i + 4; ++k)
-    step(d.quaternion[k - 4 * i], rates.quaternion, &to.value.quaternion[k],
-         &to.first.quaternion[k], &to.second.quaternion[k]);
-  for (int c = 0; c < 3; ++c) {
-    const int64_t k = (3 * i + c) * basis;
-    float *value = to.value.sh + k, *first = to.first.sh + k, *second = to.second.sh + k;
-    step(d_sh[c * basis], rates.sh_mean, value, first, second);
-#if !defined(__CUDA_ARCH__)
-#pragma omp simd
-#endif
-    for (int b = 1; b < basis; ++b)
-      step(d_sh[c * basis + b], rates.sh_rest, value + b, first + b, second + b);
-  }
-  const Splat<float> splat = {
-      {to.value.mean[3 * i], to.value.mean[3 * i + 1], to.value.mean[3 * i + 2]},
-      {to.value.log_scale[3 * i], to.value.log_scale[3 * i + 1], to.value.log_scale[3 * i + 2]},
-      {to.value.quaternion[4 * i], to.value.quaternion[4 * i + 1],
-       to.value.quaternion[4 * i + 2], to.value.quaternion[4 * i + 3]},
-      to.value.opacity_logit[i]};
-  AddSplatNoise(update, i, splat, &to.value.mean[3 * i]);
+  for (int a = 0; a < 4; ++a)
+    step(d.quaternion[a], rates.quaternion, 4 * i + a, &SplatPointers::quaternion);
+  const float *mean = to.value.mean + 3 * i, *log_scale = to.value.log_scale + 3 * i,
+              *q = to.value.quaternion + 4 * i;
+  const Splat<float> splat = {{mean[0], mean[1], mean[2]},
+                              {log_scale[0], log_scale[1], log_scale[2]},
+                              {q[0], q[1], q[2], q[3]},
+                              to.value.opacity_logit[i]};
+  AddSplatNoise(update, i, splat, to.value.mean + 3 * i);
+  return true;
+}
+
+// The same of one coefficient sh[k], which is of degree 0 (`of_mean`) or of another.
+HD inline bool UpdateColor(const SplatUpdate& update, bool of_mean, float d, int64_t k,
+                           const SplatMoments& to) {
+  using std::abs;
+  if (!(abs(d) < kLargestGradient)) return false;
+  update.Step(d, of_mean ? update.rates.sh_mean : update.rates.sh_rest, to.value.sh + k,
+              to.first.sh + k, to.second.sh + k);
   return true;
 }
 

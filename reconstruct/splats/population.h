@@ -6,24 +6,9 @@
 #include <cstdint>
 #include <vector>
 
+#include "kernels/splats/population_change.h"
+
 namespace regrade {
-
-// A splat that is copied: it and its copies get this opacity, and its scales times this factor.
-struct CopiedSplat {
-  int32_t index;
-  float opacity_logit, log_factor;
-};
-struct SplatCopy {
-  int32_t from, to;
-};
-
-// First the copied ones change, then the copies are made, whose moments, as those of the copied
-// ones, become 0.
-struct PopulationChange {
-  std::vector<CopiedSplat> copied;
-  std::vector<SplatCopy> copies;
-  int64_t count = 0;  // afterwards
-};
 
 // Moves splats of opacity below kDeadOpacity, or not finite, to places of others.
 PopulationChange MoveDead(const std::vector<float>& opacity_logits, uint64_t seed,

@@ -53,8 +53,4 @@ std::unique_ptr<SplatEngine> MakeCpuSplatEngine(const SplatOptions& options);
 // Throws Error(kResources) without CUDA.
 std::unique_ptr<SplatEngine> MakeCudaSplatEngine(const SplatOptions& options);
 
-// The same change of splats or moments on the host.
-void ApplyChange(const PopulationChange& change, bool moments, Splats* splats);
-void PadBasis(int basis, Splats* splats);
-
 }  // namespace regrade

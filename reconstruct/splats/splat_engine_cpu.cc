@@ -4,6 +4,7 @@
 
 #include "kernels/base/error.h"
 #include "kernels/splats/cpu/render_splats.h"
+#include "reconstruct/splats/rendered_splats.h"
 #include "reconstruct/splats/splat_engine.h"
 
 namespace regrade {
@@ -46,7 +47,11 @@ class CpuSplatEngine : public SplatEngine {
                           PointersOf(&state_.second_moment)};
     std::atomic<int64_t> rejected = 0;
     ForEachGradient(frame_, tile_sums_, [&](int64_t i, const Splat<float>& d, const float* d_sh) {
-      if (!UpdateSplat(step.update, i, frame_.splats.basis, d, d_sh, to)) ++rejected;
+      bool sound = UpdateShape(step.update, i, d, to);
+      const int basis = frame_.splats.basis;
+      for (int k = 0; k < 3 * basis; ++k)
+        sound &= UpdateColor(step.update, k % basis == 0, d_sh[k], 3 * basis * i + k, to);
+      rejected += !sound;
     });
     sums_.picture.absolute += sums.absolute;
     sums_.picture.squared += sums.squared;
@@ -59,19 +64,7 @@ class CpuSplatEngine : public SplatEngine {
   SplatFitSums TakeSums() override { return std::exchange(sums_, {}); }
 
   RenderedView Render(const Camera& camera) override {
-    const SplatPicture<float> picture =
-        RenderSplats(MakeSplatFrame(state_.splats.view(), camera, options_));
-    RenderedView view{Image(camera.width, camera.height),
-                      Image(camera.width, camera.height, 1),
-                      Image(camera.width, camera.height, 1)};
-    for (size_t i = 0; i < picture.color.size(); ++i)
-      view.color.pixels[i] = std::clamp(picture.color[i], 0.0f, 1.0f);
-    view.transmittance.pixels = picture.transmittance;
-    for (size_t i = 0; i < picture.depth.size(); ++i) {
-      const float weight = 1 - picture.transmittance[i];
-      view.depth.pixels[i] = weight < 0.5f ? 0.0f : picture.depth[i] / weight;
-    }
-    return view;
+    return RenderedSplats(RenderSplats(MakeSplatFrame(state_.splats.view(), camera, options_)));
   }
 
  private:
@@ -90,47 +83,6 @@ class CpuSplatEngine : public SplatEngine {
 
 std::unique_ptr<SplatEngine> MakeCpuSplatEngine(const SplatOptions& options) {
   return std::make_unique<CpuSplatEngine>(options);
-}
-
-void ApplyChange(const PopulationChange& change, bool moments, Splats* splats) {
-  const int64_t sh = 3 * splats->basis;
-  const auto resize = [&](std::vector<float>* values, int64_t each) {
-    values->resize(static_cast<size_t>(each * change.count));
-  };
-  resize(&splats->mean, 3);
-  resize(&splats->log_scale, 3);
-  resize(&splats->quaternion, 4);
-  resize(&splats->opacity_logit, 1);
-  resize(&splats->sh, sh);
-  const auto each = [&](const auto& edit) {
-    edit(&splats->mean, 3), edit(&splats->log_scale, 3), edit(&splats->quaternion, 4);
-    edit(&splats->opacity_logit, 1), edit(&splats->sh, sh);
-  };
-  for (const CopiedSplat& copied : change.copied) {
-    const size_t i = static_cast<size_t>(copied.index);
-    if (moments) {
-      each([&](std::vector<float>* values, int64_t n) {
-        std::fill_n(values->begin() + n * copied.index, n, 0.0f);
-      });
-      continue;
-    }
-    splats->opacity_logit[i] = copied.opacity_logit;
-    for (size_t a = 0; a < 3; ++a) splats->log_scale[3 * i + a] += copied.log_factor;
-  }
-  for (const SplatCopy& copy : change.copies)
-    each([&](std::vector<float>* values, int64_t n) {
-      std::copy_n(values->begin() + n * copy.from, n, values->begin() + n * copy.to);
-    });
-}
-
-void PadBasis(int basis, Splats* splats) {
-  REGRADE_CHECK(basis >= splats->basis);
-  std::vector<float> sh(static_cast<size_t>(3 * basis * splats->count()));
-  for (int64_t row = 0; row < 3 * splats->count(); ++row)
-    std::copy_n(splats->sh.begin() + row * splats->basis, splats->basis,
-                sh.begin() + row * basis);
-  splats->sh = std::move(sh);
-  splats->basis = basis;
 }
 
 }  // namespace regrade

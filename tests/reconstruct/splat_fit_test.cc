@@ -127,14 +127,17 @@ TEST(UpdateSplat, AGradientThatIsNotFiniteChangesNothing) {
   SplatUpdate update;
   update.rates = {1, 1, 1, 1, 1, 1};
   update.SetStep(0);
-  float d_sh[12] = {};
-  d_sh[11] = std::numeric_limits<float>::infinity();
-  EXPECT_FALSE(UpdateSplat(update, 1, 4, {}, d_sh, to));
-  for (const float value : splats.sh) EXPECT_EQ(value, 0);
-  d_sh[11] = 1;
-  EXPECT_TRUE(UpdateSplat(update, 1, 4, {}, d_sh, to));
-  EXPECT_FLOAT_EQ(splats.sh[23], -1);  // Adam's first step is the rate
-  EXPECT_EQ(splats.sh[22], 0);
+  Splat<float> d{};
+  d.quaternion[3] = std::numeric_limits<float>::infinity();
+  d.mean.x = 1;
+  EXPECT_FALSE(UpdateShape(update, 1, d, to));
+  EXPECT_EQ(splats.mean[3], 0);
+  d.quaternion[3] = 0;
+  EXPECT_TRUE(UpdateShape(update, 1, d, to));
+  EXPECT_FLOAT_EQ(splats.mean[3], -1);  // Adam's first step is the rate
+  EXPECT_EQ(splats.mean[4], 0);
+  EXPECT_FALSE(UpdateColor(update, true, std::numeric_limits<float>::quiet_NaN(), 5, to));
+  EXPECT_EQ(splats.sh[5], 0);
 }
 
 // --- fits

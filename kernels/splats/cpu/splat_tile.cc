@@ -40,12 +40,15 @@ const SplatTileFunctions& SplatTiles() {
 
 void SplatTape::Reserve(const SplatFrame& frame, int tile) {
   const int top = tile / frame.tiles_x * kSplatTile;
+  constexpr int kHighest = 4;  // rows of a vector's pixels
   int64_t rows = 0;
   for (int64_t e = frame.first_entry[static_cast<size_t>(tile)];
        e < frame.first_entry[static_cast<size_t>(tile) + 1]; ++e) {
     const PixelBox& box =
         frame.box[static_cast<size_t>(frame.entry_splat[static_cast<size_t>(e)])];
-    rows += std::min(box.y1, top + kSplatTile) - std::max(box.y0, top);
+    rows += std::min(std::min(box.y1, top + kSplatTile) - std::max(box.y0, top) +
+                         2 * (kHighest - 1),
+                     kSplatTile);
   }
   transmittance.Reserve(rows * kSplatTile);
   alpha.Reserve(rows * kSplatTile);

@@ -10,14 +10,28 @@
 namespace regrade::REGRADE_SIMD_NAMESPACE {
 namespace {
 
-constexpr int kPartsInRow = kSplatTile / kWide;
-constexpr int kParts = kSplatTile * kPartsInRow;  // vectors of a tile, by rows
+// A vector of pixels is a part of a tile, 4 pixels wide: small splats meet fewer squares than
+// rows.
+constexpr int kPartWidth = 4, kPartHeight = kWide / kPartWidth;
+constexpr int kPartsInRow = kSplatTile / kPartWidth;
+constexpr int kParts = kSplatTile / kPartHeight * kPartsInRow;  // of a tile, by rows
+
+// Columns and rows of a part's pixels.
+inline Wide PartX() {
+  return __builtin_convertvector(__builtin_convertvector(Ramp(), WideInt) & 3, Wide);
+}
+inline Wide PartY() {
+  return __builtin_convertvector(__builtin_convertvector(Ramp(), WideInt) >> 2, Wide);
+}
+// Part and lane of a pixel of the tile.
+inline int PartOf(int x, int y) { return y / kPartHeight * kPartsInRow + x / kPartWidth; }
+inline int LaneOf(int x, int y) { return y % kPartHeight * kPartWidth + x % kPartWidth; }
 
 // A splat as seen from a tile's upper left pixel.
 struct TileSplat {
   float dx, dy, c10, inverse00, inverse11, log_opacity, reach, z;
   Vec3f color;
-  int first_row, end_row, first_part, end_part;  // what the splat's box meets
+  int first_row, end_row, first_column, end_column;  // of parts that the splat's box meets
 
   TileSplat(const SplatFrame& frame, int32_t k, int x0, int y0) {
     const SeenSplat<float>& seen = frame.seen[static_cast<size_t>(k)];
@@ -31,23 +45,25 @@ struct TileSplat {
     reach = seen.reach;
     z = seen.z;
     color = seen.color;
-    first_row = std::max(box.y0 - y0, 0);
-    end_row = std::min(box.y1 - y0, kSplatTile);
-    first_part = std::max(box.x0 - x0, 0) / kWide;
-    end_part = (std::min(box.x1 - x0, kSplatTile) + kWide - 1) / kWide;
+    first_row = std::max(box.y0 - y0, 0) / kPartHeight;
+    end_row = (std::min(box.y1 - y0, kSplatTile) + kPartHeight - 1) / kPartHeight;
+    first_column = std::max(box.x0 - x0, 0) / kPartWidth;
+    end_column = (std::min(box.x1 - x0, kSplatTile) + kPartWidth - 1) / kPartWidth;
   }
 
   // w of the pixels of a part.
-  void Whiten(int row, int part, Wide* w0, Wide* w1) const {
-    const Wide across = Ramp() + (dx + static_cast<float>(part * kWide));
+  void Whiten(int part, Wide* w0, Wide* w1) const {
+    const Wide across =
+        PartX() + (dx + static_cast<float>(part % kPartsInRow * kPartWidth));
+    const Wide down = PartY() + (dy + static_cast<float>(part / kPartsInRow * kPartHeight));
     *w0 = across * inverse00;
-    *w1 = ((dy + static_cast<float>(row)) - c10 * *w0) * inverse11;
+    *w1 = (down - c10 * *w0) * inverse11;
   }
 
   // alpha where the pixels of `which` see the splat, 0 elsewhere; false if none does.
-  bool Alpha(int row, int part, const WideInt& which, Wide* alpha) const {
+  bool Alpha(int part, const WideInt& which, Wide* alpha) const {
     Wide w0, w1;
-    Whiten(row, part, &w0, &w1);
+    Whiten(part, &w0, &w1);
     const Wide q = w0 * w0 + w1 * w1;
     const WideInt hit = (q <= Fill(reach)) & which;
     if (!AnyOf(hit)) return false;
@@ -70,9 +86,9 @@ struct TilePixels {
     for (int p = 0; p < kParts; ++p) {
       transmittance[p] = Fill(1);
       red[p] = green[p] = blue[p] = depth[p] = median[p] = Wide{};
-      const float inside =
-          p / kPartsInRow < rows ? static_cast<float>(columns - p % kPartsInRow * kWide) : 0.0f;
-      alive[p] = Ramp() < Fill(inside);
+      const float wide = static_cast<float>(columns - p % kPartsInRow * kPartWidth);
+      const float high = static_cast<float>(rows - p / kPartsInRow * kPartHeight);
+      alive[p] = (PartX() < Fill(wide)) & (PartY() < Fill(high));
       parts_alive += AnyOf(alive[p]);
     }
   }
@@ -116,10 +132,10 @@ void ForwardTile(const SplatFrame& frame, int tile, const TilePlace& place, Tile
   for (int64_t e = first; e < end && pixels->parts_alive > 0; ++e) {
     const TileSplat splat(frame, frame.entry_splat[static_cast<size_t>(e)], place.x0, place.y0);
     for (int row = splat.first_row; row < splat.end_row; ++row)
-      for (int part = splat.first_part; part < splat.end_part; ++part) {
-        const int p = row * kPartsInRow + part;
+      for (int column = splat.first_column; column < splat.end_column; ++column) {
+        const int p = row * kPartsInRow + column;
         Wide alpha;
-        if (!splat.Alpha(row, part, pixels->alive[p], &alpha)) continue;
+        if (!splat.Alpha(p, pixels->alive[p], &alpha)) continue;
         const Wide before = pixels->transmittance[p];
         pixels->Composite(splat, p, &alpha);
         seen(static_cast<int32_t>(e - first), p, before, alpha);
@@ -134,7 +150,7 @@ void RenderTile(const SplatFrame& frame, int tile, SplatPicture<float>* picture)
   const Vec3f& background = frame.splats.background;
   for (int row = 0; row < place.rows; ++row)
     for (int x = 0; x < place.columns; ++x) {
-      const int p = row * kPartsInRow + x / kWide, lane = x % kWide;
+      const int p = PartOf(x, row), lane = LaneOf(x, row);
       const size_t at = static_cast<size_t>(place.y0 + row) * picture->width + place.x0 + x;
       const float t = pixels.transmittance[p][lane];
       picture->color[3 * at] = pixels.red[p][lane] + background.x * t;
@@ -154,7 +170,7 @@ struct TileGradient {
     alignas(64) float lanes[5][kParts][kWide] = {};
     for (int row = 0; row < place.rows; ++row)
       for (int x = 0; x < place.columns; ++x) {
-        const int p = row * kPartsInRow + x / kWide, lane = x % kWide;
+        const int p = PartOf(x, row), lane = LaneOf(x, row);
         const size_t at = static_cast<size_t>(place.y0 + row) * d.width + place.x0 + x;
         for (int c = 0; c < 3; ++c) lanes[c][p][lane] = d.color[3 * at + c];
         lanes[3][p][lane] = d.depth[at];
@@ -211,7 +227,7 @@ struct TileBehind {
     depth[p] = splat.z * alpha + depth[p] * through;
     clear[p] *= through;
     Wide w0, w1;
-    splat.Whiten(p / kPartsInRow, p % kPartsInRow, &w0, &w1);
+    splat.Whiten(p, &w0, &w1);
     // Lanes that do not see the splat may be far from it.
     const Wide g0 = g * w0, g1 = g * w1, weight = t * alpha;
     sums->f += g;

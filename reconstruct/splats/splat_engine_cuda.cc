@@ -1,0 +1,122 @@
+#include <algorithm>
+#include <utility>
+
+#include "kernels/image/cuda/device_picture_loss.h"
+#include "kernels/splats/cuda/device_splat_update.h"
+#include "reconstruct/splats/rendered_splats.h"
+#include "reconstruct/splats/splat_engine.h"
+
+namespace regrade {
+namespace {
+
+struct DevicePhoto {
+  DeviceBuffer<uint16_t> color;
+  DeviceBuffer<uint8_t> masked;
+};
+
+class CudaSplatEngine : public SplatEngine {
+ public:
+  explicit CudaSplatEngine(const SplatOptions& options)
+      : options_(options), rejected_(1, "rejected gradients") {
+    rejected_.Zero();
+  }
+
+  void SetPhotos(const SplatPhotos* photos) override {
+    photos_ = photos;
+    on_device_.clear();
+    int64_t most = 0;
+    for (int i = 0; i < photos->count(); ++i) {
+      const SplatPhoto& photo = (*photos)[i];
+      DevicePhoto& own = on_device_.emplace_back();
+      own.color = DeviceBuffer<uint16_t>(std::ssize(photo.color), "photos");
+      own.color.CopyIn(photo.color.data(), std::ssize(photo.color));
+      most = std::max(most, own.color.size());
+      if (photo.masked.empty()) continue;
+      own.masked = DeviceBuffer<uint8_t>(std::ssize(photo.masked), "masks");
+      own.masked.CopyIn(photo.masked.data(), std::ssize(photo.masked));
+    }
+    if (d_picture_.size() < most) d_picture_ = DeviceBuffer<float>(most, "gradient of a photo");
+  }
+
+  void SetState(SplatFitState state) override {
+    splats_.value.Upload(state.splats);
+    splats_.first.Upload(state.first_moment);
+    splats_.second.Upload(state.second_moment);
+  }
+
+  void ReadState(const std::function<void(SplatFitState*)>& read) override {
+    SplatFitState state;
+    state.splats = splats_.value.Download();
+    state.first_moment = splats_.first.Download();
+    state.second_moment = splats_.second.Download();
+    read(&state);
+  }
+
+  int64_t count() const override { return splats_.value.count; }
+  int basis() const override { return splats_.value.basis; }
+
+  std::vector<float> OpacityLogits() override {
+    std::vector<float> logits(static_cast<size_t>(count()));
+    splats_.value.opacity_logit.CopyOut(logits.data(), count());
+    return logits;
+  }
+
+  void Change(const PopulationChange& change) override { ApplyChangeOnDevice(change, &splats_); }
+
+  void SetBasis(int basis) override {
+    for (DeviceSplats* splats : {&splats_.value, &splats_.first, &splats_.second}) {
+      Splats host = splats->Download();
+      PadBasis(basis, &host);
+      const int64_t capacity = splats->capacity();
+      splats->Upload(host);
+      splats->Reserve(capacity);
+    }
+  }
+
+  void Step(const SplatStep& step) override {
+    const Camera& camera = (*photos_)[step.photo].camera;
+    const DevicePhoto& photo = on_device_[static_cast<size_t>(step.photo)];
+    renderer_.Render(splats_.value.view(), camera, options_, SplatPass::kColorAdjoint);
+    loss_.Compare(camera.width, camera.height, photo.color.data(), photo.masked.data(),
+                  renderer_.pixels().color, step.ssim_weight, d_picture_.data());
+    SplatPixels<const float> d{};
+    d.color = d_picture_.data();
+    UpdateSplats(step.update, renderer_.SumPixels(d), splats_, rejected_.data());
+    entries_ += renderer_.num_entries();
+  }
+
+  SplatFitSums TakeSums() override {
+    SplatFitSums sums;
+    sums.picture = loss_.TakeSums();
+    sums.pairs = std::exchange(entries_, 0);
+    uint32_t rejected = 0;
+    rejected_.CopyOut(&rejected, 1);
+    rejected_.Zero();
+    sums.rejected = rejected;
+    return sums;
+  }
+
+  RenderedView Render(const Camera& camera) override {
+    renderer_.Render(splats_.value.view(), camera, options_);
+    return RenderedSplats(renderer_.Download());
+  }
+
+ private:
+  SplatOptions options_;
+  const SplatPhotos* photos_ = nullptr;
+  std::vector<DevicePhoto> on_device_;
+  DeviceBuffer<float> d_picture_;
+  DeviceSplatMoments splats_;
+  DeviceSplatRenderer renderer_;
+  DevicePictureLoss loss_;
+  DeviceBuffer<uint32_t> rejected_;
+  int64_t entries_ = 0;
+};
+
+}  // namespace
+
+std::unique_ptr<SplatEngine> MakeCudaSplatEngine(const SplatOptions& options) {
+  return std::make_unique<CudaSplatEngine>(options);
+}
+
+}  // namespace regrade
