@@ -1,11 +1,10 @@
 // A bucket's splats are those of 16 lanes, two each, and the tile's pixels pass along the
 // lanes: in step s, lane l adds pixel s - l to the sums of its own splats, and hands the
 // pixel's state to the next lane. So a splat's sums stay in registers, and a pixel's state is
-// two numbers: T_i and
-//   b_i = b_0 - sum_{j < i} w_j s_j,  s_j = <c_j, d_C> + z_j d_Z,  b_0 = <C, d_C> + Z d_Z + T_N
-//   d_T,
-// what the splats from i on and the background add to the loss. For R_i
-// see EQ(splat-composite-adjoint); b_i = T_i <R_i, (d_C, d_Z, d_T)>, and so
+// two numbers: T_i, and what the splats from i on and the background add to the loss,
+//   b_i = b_0 - sum_{j < i} w_j s_j,   s_j = <c_j, d_C> + z_j d_Z,
+//   b_0 = <C, d_C> + Z d_Z + T_N d_T.
+// With R_i as in compositing.h, b_i = T_i <R_i, (d_C, d_Z, d_T)>, and so
 //   g_i = alpha_i d_alpha_i = alpha_i (T_i s_i - b_{i+1} / (1 - alpha_i)).
 // The difference leaves some roundings of b_0 in b_{i+1}: little to the gradient by splats in
 // front, but 1e-4 of that by a splat which all pixels see at T near 1e-3.
@@ -23,6 +22,7 @@ namespace regrade {
 namespace {
 
 constexpr int kGroups = 4;  // buckets of a block
+static_assert(kGroups <= kBucketRoom);
 
 struct PixelState {
   float transmittance;  // 0: ended
@@ -111,10 +111,15 @@ __global__ void __launch_bounds__(kGroups* kBucketLanes, kDepth ? 12 : 14)
   TileDepths* const depths = all_depths + (kDepth ? group : 0);
   const int64_t place = blockIdx.x * int64_t{kGroups} + group;
   const int num_buckets = *kept.num_buckets;
-  if (blockIdx.x * int64_t{kGroups} >= num_buckets) return;
-  // Groups without a bucket do the last one again, and write nothing.
+  const TileBucket loaded = kept.bucket[place];  // or of the room behind the last one
   const bool on = place < num_buckets;
-  const TileBucket bucket = kept.bucket[min(place, int64_t{num_buckets - 1})];
+  if (!__any_sync(kWholeWarp, on)) return;
+  // Groups without a bucket do that of the warp's first group again, and write nothing.
+  const int source = on ? static_cast<int>(threadIdx.x % 32) : 0;
+  const TileBucket bucket = {__shfl_sync(kWholeWarp, loaded.tile, source),
+                             __shfl_sync(kWholeWarp, loaded.first, source),
+                             __shfl_sync(kWholeWarp, loaded.end, source),
+                             __shfl_sync(kWholeWarp, loaded.checkpoint, source)};
   const int first = bucket.first + lane * kSplatsOfLane;
   BeginToLoad(bucket, lane, kept, gradients, tile);
   TileEntry entry[kSplatsOfLane];
