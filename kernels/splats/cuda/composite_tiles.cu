@@ -1,7 +1,7 @@
 // Composites a tile by a warp, two pixels a thread.
-#include "kernels/splats/cuda/composite_tiles.h"
-
 #include "kernels/device/device_stream.h"
+#include "kernels/splats/cuda/composite_tiles.h"
+#include "kernels/splats/cuda/device_math.h"
 #include "kernels/splats/cuda/tile_splat.h"
 #include "kernels/splats/splat_camera.h"
 
@@ -11,42 +11,41 @@ namespace regrade {
 
 namespace {
 
-constexpr unsigned kAll = 0xFFFFFFFF;
 constexpr int kWarps = 2;  // of a block
 constexpr int kCheck = 8;  // entries after which a tile may end
 
-// A pixel on its way through the splats. `running` is T, or 0 once the pixel has ended.
+// A pixel on its way through the splats.
 struct Running {
-  float running, transmittance, depth, median_depth;
+  float transmittance;  // negative once the pixel has ended
+  float depth = 0, median_depth = 0;
   Vec3f color;
 
-  __device__ explicit Running(bool inside)
-      : running(inside ? 1 : 0), transmittance(1), depth(0), median_depth(0), color() {}
+  __device__ explicit Running(bool inside) : transmittance(inside ? 1.0f : -1.0f), color() {}
+  __device__ bool alive() const { return transmittance > 0; }
 
   // See CompositeSplat and HitSplat.
   template <bool kDepth>
   __device__ void Composite(const TileSplat& splat, float exponent) {
     const float alpha =
         TileSplat::Sees(exponent) ? fminf(FastExp2(exponent), float(kMaxAlpha)) : 0.0f;
-    const float after = running * (1 - alpha);
+    const float t = transmittance, after = t * (1 - alpha);
     const bool stays = after >= float(kMinTransmittance);
-    const float weight = stays ? running * alpha : 0.0f;
+    const float weight = stays ? t * alpha : 0.0f;
     color.x = fmaf(weight, splat.color.x, color.x);
     color.y = fmaf(weight, splat.color.y, color.y);
     color.z = fmaf(weight, splat.color.z, color.z);
     if constexpr (kDepth) {
       depth = fmaf(weight, splat.z, depth);
-      if (stays && running > 0.5f && !(after > 0.5f)) median_depth = splat.z;
+      if (stays && t > 0.5f && !(after > 0.5f)) median_depth = splat.z;
     }
-    running = stays ? after : 0.0f;
-    if (stays) transmittance = after;
+    transmittance = stays ? after : -fabsf(t);
   }
 };
 
 template <bool kDepth>
 __device__ void Write(const Running& pixel, const Vec3f& background, int64_t at,
                       const SplatPixels<float>& pixels) {
-  const float t = pixel.transmittance;
+  const float t = fabsf(pixel.transmittance);
   pixels.color[3 * at] = pixel.color.x + background.x * t;
   pixels.color[3 * at + 1] = pixel.color.y + background.y * t;
   pixels.color[3 * at + 2] = pixel.color.z + background.z * t;
@@ -59,7 +58,7 @@ __device__ void Write(const Running& pixel, const Vec3f& background, int64_t at,
 
 template <bool kDepth>
 __device__ void Keep(const Running& pixel, int64_t at, const KeptTiles& kept) {
-  kept.checkpoint[at] = {pixel.running, pixel.color};
+  kept.checkpoint[at] = {fmaxf(pixel.transmittance, 0), pixel.color};
   if (kDepth && kept.depth != nullptr) kept.depth[at] = pixel.depth;
 }
 
@@ -87,7 +86,7 @@ __global__ void __launch_bounds__(32 * kWarps)
   int buckets = 0;
   int32_t next = first + lane < end ? lists.entry[first + lane].splat : 0;
   for (int at = first; at < end; at += kBucket) {
-    if (!__any_sync(kAll, one.running > 0 || two.running > 0)) break;
+    if (!__any_sync(kWholeWarp, one.alive() || two.alive())) break;
     if constexpr (kKeep) {
       const int64_t place = int64_t{checkpoint + buckets} * kTilePixels + lane;
       Keep<kDepth>(one, place, kept);
@@ -108,7 +107,7 @@ __global__ void __launch_bounds__(32 * kWarps)
         one.Composite<kDepth>(splat, splat.Exponent(across, splat.Along(slant, y)));
         two.Composite<kDepth>(splat, splat.Exponent(across, splat.Along(slant, y + kApart)));
       }
-      if (!__any_sync(kAll, one.running > 0 || two.running > 0)) break;
+      if (!__any_sync(kWholeWarp, one.alive() || two.alive())) break;
     }
   }
 
@@ -122,7 +121,7 @@ __global__ void __launch_bounds__(32 * kWarps)
     if (buckets == 0) return;
     int at = 0;
     if (lane == 0) at = atomicAdd(kept.num_buckets, buckets);
-    at = __shfl_sync(kAll, at, 0);
+    at = __shfl_sync(kWholeWarp, at, 0);
     for (int b = lane; b < buckets; b += 32)
       kept.bucket[at + b] = {tile, first + b * kBucket, min(first + (b + 1) * kBucket, end),
                              checkpoint + b};
@@ -136,8 +135,8 @@ void CompositeTiles(const TileListsView& lists, const SplatRecord* record,
                     const KeptTiles& kept) {
   const unsigned blocks = static_cast<unsigned>((lists.grid.count() + kWarps - 1) / kWarps);
   const auto launch = [&](auto depth, auto keep) {
-    Composite<depth(), keep()><<<blocks, 32 * kWarps, 0, LaunchStream()>>>(
-        lists, record, background, pixels, kept);
+    Composite<depth(), keep()>
+        <<<blocks, 32 * kWarps, 0, LaunchStream()>>>(lists, record, background, pixels, kept);
   };
   const bool depth = pixels.depth != nullptr;
   if (depth && kept.on())

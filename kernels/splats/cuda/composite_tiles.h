@@ -28,11 +28,14 @@ struct alignas(16) TileBucket {
   int32_t tile, first, end, checkpoint;  // entries [first, end)
 };
 
+inline constexpr int kBucketRoom = 16;
+
 // What is kept for the adjoint.
 struct KeptTiles {
   PixelCheckpoint* checkpoint = nullptr;  // [checkpoints, kTilePixels]
   float* depth = nullptr;                 // [checkpoints, kTilePixels]; or null: not kept
-  TileBucket* bucket = nullptr;           // that some pixel of its tile reached, in any order
+  TileBucket* bucket = nullptr;           // that some pixel of its tile reached, in any order;
+                                          // and room for kBucketRoom more
   int32_t* num_buckets = nullptr;         // must be 0 before
 
   bool on() const { return checkpoint != nullptr; }

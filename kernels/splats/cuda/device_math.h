@@ -5,6 +5,8 @@
 
 namespace regrade {
 
+constexpr unsigned kWholeWarp = 0xFFFFFFFF;  // a mask of lanes
+
 // 2^x to 2 units in the last place.
 __device__ inline float FastExp2(float x) {
   float result;

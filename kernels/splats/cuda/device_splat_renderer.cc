@@ -53,7 +53,7 @@ void DeviceSplatRenderer::Render(const SplatsView<float>& splats, const Camera& 
     GrowBuffer(checkpoints * kTilePixels, "pixels between splats", &checkpoint_);
     if (pass == SplatPass::kAdjoint)
       GrowBuffer(checkpoints * kTilePixels, "pixels between splats", &checkpoint_depth_);
-    GrowBuffer(checkpoints, "buckets of splats", &bucket_);
+    GrowBuffer(checkpoints + kBucketRoom, "buckets of splats", &bucket_);
     GrowBuffer(1, "number of buckets", &num_buckets_);
     num_buckets_.Zero();
   }

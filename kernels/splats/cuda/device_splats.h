@@ -28,8 +28,14 @@ struct DeviceSplats {
   void Zero();
 
   SplatsView<float> view() const {
-    return {mean.data(), log_scale.data(), quaternion.data(), opacity_logit.data(), sh.data(),
-            count,       basis,            background};
+    return {mean.data(),
+            log_scale.data(),
+            quaternion.data(),
+            opacity_logit.data(),
+            sh.data(),
+            count,
+            basis,
+            background};
   }
 };
 

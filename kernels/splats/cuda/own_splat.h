@@ -1,5 +1,5 @@
-// One splat's values in a thread's registers, as a SplatsView for the specification's functions.
-// Device code only.
+// One splat's values in a thread's registers, as a SplatsView for the specification's
+// functions. Device code only.
 #pragma once
 
 #include "kernels/splats/splats.h"
@@ -43,9 +43,9 @@ struct OwnSplat {
 
   // Of this splat alone, as splat 0. `basis` 0: without its colour.
   __device__ SplatsView<float> view(int basis = kBasis) const {
-    return {&values.mean.x,        &values.log_scale.x, values.quaternion,
-            &values.opacity_logit, sh,                  1,
-            basis};
+    return {
+        &values.mean.x, &values.log_scale.x, values.quaternion, &values.opacity_logit, sh, 1,
+        basis};
   }
 };
 

@@ -1,7 +1,7 @@
-#include "kernels/splats/cuda/pixel_gradients.h"
-
 #include "kernels/device/device_stream.h"
 #include "kernels/device/launch_size.h"
+#include "kernels/splats/cuda/device_math.h"
+#include "kernels/splats/cuda/pixel_gradients.h"
 
 namespace regrade {
 
@@ -12,7 +12,7 @@ namespace {
 // The sum of a warp's values, in a fixed order; valid in lane 0.
 template <typename T>
 __device__ T SumOfWarp(T value) {
-  for (int step = 16; step > 0; step /= 2) value += __shfl_down_sync(0xFFFFFFFF, value, step);
+  for (int step = 16; step > 0; step /= 2) value += __shfl_down_sync(kWholeWarp, value, step);
   return value;
 }
 

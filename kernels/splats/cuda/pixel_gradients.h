@@ -1,4 +1,5 @@
-// The gradient by a picture's pixels, in the order of tiles, and the gradient by the background.
+// The gradient by a picture's pixels, in the order of tiles, and the gradient by the
+// background.
 #pragma once
 
 #include "kernels/device/device_memory.h"

@@ -1,9 +1,8 @@
 // Projects splats, a thread each, see SeeSplat.
-#include "kernels/splats/cuda/see_splats.h"
-
 #include "kernels/device/device_stream.h"
 #include "kernels/splats/cuda/by_splat_basis.h"
 #include "kernels/splats/cuda/own_splat.h"
+#include "kernels/splats/cuda/see_splats.h"
 #include "kernels/splats/cuda/seen_list.h"
 #include "kernels/splats/seen_splat.h"
 

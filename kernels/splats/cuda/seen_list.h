@@ -3,6 +3,8 @@
 
 #include <cstdint>
 
+#include "kernels/splats/cuda/device_math.h"
+
 #if defined(__CUDACC__)
 
 namespace regrade {
@@ -18,8 +20,9 @@ struct SeenList {
 
   static __device__ int64_t First() { return blockIdx.x * int64_t{kChunk}; }
 
-  // Fills list [kChunk] with the splats of this block's chunk that have tiles, in order, counted
-  // from the chunk's first one; returns their number. Called by whole blocks, which it lets wait.
+  // Fills list [kChunk] with the splats of this block's chunk that have tiles, in order,
+  // counted from the chunk's first one; returns their number. Called by whole blocks, which it
+  // lets wait.
   static __device__ int Make(const int32_t* num_tiles, int64_t count, uint16_t* list) {
     constexpr int kWarps = kBlock / 32;
     __shared__ int in_warp[kRounds * kWarps];
@@ -29,7 +32,7 @@ struct SeenList {
 #pragma unroll
     for (int r = 0; r < kRounds; ++r) {
       const int64_t i = first + r * kBlock + thread;
-      seen[r] = __ballot_sync(0xFFFFFFFF, i < count && num_tiles[i] > 0);
+      seen[r] = __ballot_sync(kWholeWarp, i < count && num_tiles[i] > 0);
       if (lane == 0) in_warp[r * kWarps + warp] = __popc(seen[r]);
     }
     __syncthreads();

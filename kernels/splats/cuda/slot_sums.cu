@@ -1,6 +1,6 @@
-#include "kernels/splats/cuda/slot_sums.h"
-
 #include "kernels/device/device_stream.h"
+#include "kernels/splats/cuda/device_math.h"
+#include "kernels/splats/cuda/slot_sums.h"
 
 namespace regrade {
 
@@ -8,7 +8,6 @@ namespace regrade {
 
 namespace {
 
-constexpr unsigned kAll = 0xFFFFFFFF;
 constexpr int kBlock = 128;      // threads
 constexpr int kManyTiles = 128;  // a warp shares the work for splats with more
 constexpr int kStaged = 64;      // slots that a warp has in shared memory at a time
@@ -26,7 +25,7 @@ struct Total {
   // Of all lanes' totals, in a fixed order.
   __device__ void AddLanes() {
     for (double& v : value)
-      for (int step = 16; step > 0; step /= 2) v += __shfl_xor_sync(kAll, v, step);
+      for (int step = 16; step > 0; step /= 2) v += __shfl_xor_sync(kWholeWarp, v, step);
   }
   __device__ SlotSums Rounded() const {
     float f[10];
@@ -71,20 +70,20 @@ __global__ void __launch_bounds__(kBlock)
   const int32_t i = k < count ? order[k] : 0;
   const int tiles = k < count ? num_tiles[i] : 0;
   const int first = tiles > 0 ? first_slot[i] : 0, end = first + tiles;
-  if (__shfl_sync(kAll, tiles, 0) == 0) return;  // and none after it
-  const unsigned many = __ballot_sync(kAll, tiles > kManyTiles);
+  if (__shfl_sync(kWholeWarp, tiles, 0) == 0) return;  // and none after it
+  const unsigned many = __ballot_sync(kWholeWarp, tiles > kManyTiles);
   // Runs of splats that are not many-tiled are staged together.
-  for (unsigned left = __ballot_sync(kAll, tiles > 0); left != 0;) {
+  for (unsigned left = __ballot_sync(kWholeWarp, tiles > 0); left != 0;) {
     const int begin_lane = __ffs(static_cast<int>(left)) - 1;
-    const int from = __shfl_sync(kAll, first, begin_lane);
+    const int from = __shfl_sync(kWholeWarp, first, begin_lane);
     if (many >> begin_lane & 1) {
-      SumMany(sums, from, __shfl_sync(kAll, end, begin_lane), stamp, lane);
+      SumMany(sums, from, __shfl_sync(kWholeWarp, end, begin_lane), stamp, lane);
       left &= left - 1;
       continue;
     }
     const unsigned stops = (many | ~left) & ~((2u << begin_lane) - 1);
     const int end_lane = stops != 0 ? __ffs(static_cast<int>(stops)) - 1 : 32;
-    const int to = __shfl_sync(kAll, end, end_lane - 1);
+    const int to = __shfl_sync(kWholeWarp, end, end_lane - 1);
     const bool mine = lane >= begin_lane && lane < end_lane;
     Total total;
     for (int base = from; base < to; base += kStaged) {

@@ -118,7 +118,8 @@ __global__ void __launch_bounds__(kBlock) UseColors(SplatSumsView view, Use use)
 //     [3, basis] of their splat. kCount is 4 for a basis of 4 or 16, with `at` a multiple of 4,
 //     and otherwise 1.
 // All of a splat's values are read before any of its gradients is handed out, and by no other
-// splat's thread: `use` may change the values whose gradient it has. The same bits in every run.
+// splat's thread: `use` may change the values whose gradient it has. The same bits in every
+// run.
 template <typename Use>
 void UseSplatGradients(const SplatSumsView& view, const Use& use) {
   using namespace splat_adjoint;

@@ -22,8 +22,8 @@ struct alignas(16) SplatRecord {
 };
 
 struct TileGrid {
-  int width = 0, height = 0;      // pixels
-  int columns = 0, rows = 0;      // tiles
+  int width = 0, height = 0;  // pixels
+  int columns = 0, rows = 0;  // tiles
   TileGrid() = default;
   TileGrid(int width, int height)
       : width(width),
@@ -116,7 +116,6 @@ class SplatTiles {
   // The same by all threads of a warp, each of which visits rows.
   template <typename Visit>
   __device__ void ForAllByWarp(const Visit& visit) const {
-    constexpr unsigned kAll = 0xFFFFFFFF;
     const int lane = static_cast<int>(threadIdx.x % 32);
     int before = 0;
     for (int first = first_row_; first < end_row_; first += 32) {
@@ -125,13 +124,13 @@ class SplatTiles {
       const int width = span.end - span.begin;
       int sum = width;
       for (int step = 1; step < 32; step *= 2) {
-        const int other = __shfl_up_sync(kAll, sum, step);
+        const int other = __shfl_up_sync(kWholeWarp, sum, step);
         if (lane >= step) sum += other;
       }
       int place = before + sum - width;
       for (int column = span.begin; column < span.end; ++column)
         visit(row * columns_ + column, place++);
-      before += __shfl_sync(kAll, sum, 31);
+      before += __shfl_sync(kWholeWarp, sum, 31);
     }
   }
 
@@ -140,7 +139,8 @@ class SplatTiles {
 
   // Tiles of `count` of which a pixel's centre is within [low, high].
   static __device__ void Limit(float low, float high, int count, int* begin, int* end) {
-    const float first = ceilf(__fmul_rn(__fsub_rn(low, kDeviceTile - 0.5f), 1.0f / kDeviceTile));
+    const float first =
+        ceilf(__fmul_rn(__fsub_rn(low, kDeviceTile - 0.5f), 1.0f / kDeviceTile));
     const float last = floorf(__fmul_rn(__fsub_rn(high, 0.5f), 1.0f / kDeviceTile));
     const float most = static_cast<float>(count);
     *begin = static_cast<int>(fminf(fmaxf(first, 0), most));
@@ -150,11 +150,10 @@ class SplatTiles {
   // The greatest w_0 (sign 1) or the least (-1) with t in [low, high]; `extreme`: t of the
   // whole ellipse's.
   __device__ float Side(float extreme, float low, float high, float sign) const {
-    const float t =
-        fminf(fmaxf(fminf(fmaxf(extreme, low), high), -radius_), radius_);
+    const float t = fminf(fmaxf(fminf(fmaxf(extreme, low), high), -radius_), radius_);
     if (t == extreme) return __fmul_rn(sign, radius_);
-    const float half = FastRoot(fmaxf(
-        __fsub_rn(__fmul_rn(radius_, radius_), __fmul_rn(t, t)), 0));
+    const float half =
+        FastRoot(fmaxf(__fsub_rn(__fmul_rn(radius_, radius_), __fmul_rn(t, t)), 0));
     return __fmaf_rn(k0_, t, __fmul_rn(sign, __fmul_rn(k1_, half)));
   }
 

@@ -1,5 +1,5 @@
-// The adjoint of compositing tiles, see EQ(splat-composite-adjoint): sums of every splat over the
-// pixels of every tile.
+// The adjoint of compositing tiles, see EQ(splat-composite-adjoint): sums of every splat over
+// the pixels of every tile.
 #pragma once
 
 #include "kernels/device/device_memory.h"

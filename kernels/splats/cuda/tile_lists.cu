@@ -1,11 +1,11 @@
-#include "kernels/splats/cuda/tile_lists.h"
-
 #include <utility>
 
 #include "kernels/base/error.h"
 #include "kernels/device/device_stream.h"
 #include "kernels/device/launch_size.h"
+#include "kernels/splats/cuda/device_math.h"
 #include "kernels/splats/cuda/grow_buffer.h"
+#include "kernels/splats/cuda/tile_lists.h"
 
 #if defined(__CUDACC__)
 #include <cub/device/device_radix_sort.cuh>
@@ -18,7 +18,6 @@ namespace regrade {
 
 namespace {
 
-constexpr unsigned kAll = 0xFFFFFFFF;
 constexpr int kManyTiles = 48;      // a warp shares the work for splats with more
 constexpr int kEntryThreads = 128;  // of a block that makes entries
 constexpr int kStaged = 768;        // entries of a warp in shared memory
@@ -46,8 +45,8 @@ __global__ void __launch_bounds__(kEntryThreads)
   const int lane = static_cast<int>(threadIdx.x % 32);
   const int64_t k = Thread();
   const int64_t first = offset[min(k, n)], end = offset[min(k + 1, n)];
-  const int64_t begin_of_warp = __shfl_sync(kAll, first, 0);
-  const int64_t end_of_warp = __shfl_sync(kAll, end, 31);
+  const int64_t begin_of_warp = __shfl_sync(kWholeWarp, first, 0);
+  const int64_t end_of_warp = __shfl_sync(kWholeWarp, end, 31);
   if (begin_of_warp == end_of_warp) return;
   const int32_t splat = first < end ? order[k] : 0;
   if (first < end) first_slot[splat] = static_cast<int32_t>(first);
@@ -69,17 +68,17 @@ __global__ void __launch_bounds__(kEntryThreads)
     for (int base = 0; base < total; base += 32) {
       const int at = base + lane;
       const uint32_t made = at < total ? stage[at] : 0;
-      const int32_t its = __shfl_sync(kAll, splat, static_cast<int>(made & 31));
+      const int32_t its = __shfl_sync(kWholeWarp, splat, static_cast<int>(made & 31));
       if (at >= total) continue;
       key[begin_of_warp + at] = static_cast<Key>(made >> 5);
       entry[begin_of_warp + at] = {its, static_cast<int32_t>(begin_of_warp) + at};
     }
     return;
   }
-  for (unsigned left = __ballot_sync(kAll, many); left != 0; left &= left - 1) {
+  for (unsigned left = __ballot_sync(kWholeWarp, many); left != 0; left &= left - 1) {
     const int source = __ffs(static_cast<int>(left)) - 1;
-    const int32_t shared = __shfl_sync(kAll, splat, source);
-    const int64_t from = __shfl_sync(kAll, first, source);
+    const int32_t shared = __shfl_sync(kWholeWarp, splat, source);
+    const int64_t from = __shfl_sync(kWholeWarp, first, source);
     SplatTiles(record[shared], grid).ForAllByWarp([&](int tile, int place) {
       key[from + place] = static_cast<Key>(tile);
       entry[from + place] = {shared, static_cast<int32_t>(from) + place};
@@ -175,8 +174,7 @@ void TileLists::Make(const SeenSplats& seen, int64_t count, const TileGrid& grid
     GrowBuffer(2 * bytes, "tiles of splats", &tile_keys_);
     cub::DoubleBuffer<Key> keys(reinterpret_cast<Key*>(tile_keys_.data()),
                                 reinterpret_cast<Key*>(tile_keys_.data() + bytes));
-    const unsigned blocks =
-        static_cast<unsigned>((count + kEntryThreads - 1) / kEntryThreads);
+    const unsigned blocks = static_cast<unsigned>((count + kEntryThreads - 1) / kEntryThreads);
     MakeEntries<<<blocks, kEntryThreads, 0, LaunchStream()>>>(
         order.Current(), offset_.data(), count, seen.record, grid, first_slot_.data(),
         keys.Current(), entries.Current());
