@@ -9,14 +9,16 @@
 namespace regrade {
 namespace {
 
-constexpr double kFoldTolerance = 1e-6;  // of a direction, there and back
+// Where the camera's photo shows image point (u, v) of a lens without distortion.
+struct Place {
+  double u = 0, v = 0;
+  bool in_front = false;
+};
 
-// Where the camera's photo shows the direction `ray` of camera coordinates.
-bool PlaceOf(const Camera& own, const Vec3d& ray, double* u, double* v) {
-  if (!own.Project(ray, u, v)) return false;
-  if (!(*u >= 0 && *v >= 0 && *u <= own.width && *v <= own.height)) return false;
-  const Vec3d back = own.CameraRay(*u, *v);
-  return Norm(Normalized(back) - Normalized(ray)) <= kFoldTolerance;
+Place PlaceOf(const Camera& own, const Camera& plain, double u, double v) {
+  Place place;
+  place.in_front = own.Project(plain.CameraRay(u, v), &place.u, &place.v);
+  return place;
 }
 
 void CubicWeights(double t, double* w) {
@@ -56,15 +58,21 @@ Image UndistortPhoto(const Image& photo, const Camera& camera) {
   own.ndc = {};
   const Camera plain = own.Undistorted();
   Image result(photo.width, photo.height, photo.channels);
+  constexpr float kNone = std::numeric_limits<float>::quiet_NaN();
 #pragma omp parallel for schedule(dynamic, 4)
-  for (int y = 0; y < photo.height; ++y)
+  for (int y = 0; y < photo.height; ++y) {
+    Place next = PlaceOf(own, plain, 0.5, y + 0.5);
     for (int x = 0; x < photo.width; ++x) {
-      double u, v;
-      const bool seen = PlaceOf(own, plain.CameraRay(x + 0.5, y + 0.5), &u, &v);
+      const Place at = next, below = PlaceOf(own, plain, x + 0.5, y + 1.5);
+      next = PlaceOf(own, plain, x + 1.5, y + 0.5);
+      const double area = (next.u - at.u) * (below.v - at.v) -
+                          (next.v - at.v) * (below.u - at.u);  // negative where it folds over
+      const bool seen = at.in_front && area > 0 && at.u >= 0 && at.v >= 0 &&
+                        at.u <= photo.width && at.v <= photo.height;
       for (int c = 0; c < photo.channels; ++c)
-        result.at(x, y)[c] = seen ? SampleCubic(photo, u - 0.5, v - 0.5, c)
-                                  : std::numeric_limits<float>::quiet_NaN();
+        result.at(x, y)[c] = seen ? SampleCubic(photo, at.u - 0.5, at.v - 0.5, c) : kNone;
     }
+  }
   return result;
 }
 

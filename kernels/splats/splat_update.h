@@ -1,8 +1,9 @@
 // One optimizer step of a splat, the same body on both processors.
 //
-// EQ(splat-adam): Adam (EQ(adam), epsilon 1e-15) on every value of a splat, with a rate for each
-// attribute, on the gradient of the picture's loss and of EQ(splat-regularizers), Kheradmand et
-// al. 2024, eq. 10:  lambda_o mean sigmoid(x_i) + lambda_s mean exp(l_ik)  over all splats.
+// EQ(splat-adam): Adam (see EQ(adam); epsilon 1e-15) on every value of a splat, with a rate for
+// each attribute, on the gradient of the picture's loss and of EQ(splat-regularizers),
+// Kheradmand et al. 2024, eq. 10:  lambda_o mean sigmoid(x_i) + lambda_s mean exp(l_ik)  over
+// all splats.
 //
 // EQ(splat-noise), Kheradmand et al. 2024, eq. 8: after the step, with the covariance Sigma of
 // EQ(splat-covariance) and n ~ N(0, 1)^3,
@@ -42,8 +43,8 @@ struct SplatUpdate {
   float inverse_correction1 = 1, inverse_correction2 = 1;
 
   HD void Step(float gradient, float rate, float* value, float* first, float* second) const {
-    AdamUpdate(gradient, beta1, beta2, epsilon, rate * inverse_correction1,
-               inverse_correction2, value, first, second);
+    AdamUpdate(gradient, beta1, beta2, epsilon, rate * inverse_correction1, inverse_correction2,
+               value, first, second);
   }
 
   void SetStep(uint64_t number) {
@@ -93,8 +94,9 @@ HD inline void AddSplatNoise(const SplatUpdate& update, int64_t i, const Splat<f
   for (int a = 0; a < 3; ++a) mean[a] += offset[a];
 }
 
-// Steps everything but the colour of splat i by the gradient d of the picture's loss. A gradient
-// that is not finite, or whose square is not, changes nothing, and the result is false.
+// Steps everything but the colour of splat i by the gradient d of the picture's loss. A
+// gradient that is not finite, or whose square is not, changes nothing, and the result is
+// false.
 HD inline bool UpdateShape(const SplatUpdate& update, int64_t i, const Splat<float>& d,
                            const SplatMoments& to) {
   using std::abs, std::exp;
@@ -136,6 +138,23 @@ HD inline bool UpdateColor(const SplatUpdate& update, bool of_mean, float d, int
   if (!(abs(d) < kLargestGradient)) return false;
   update.Step(d, of_mean ? update.rates.sh_mean : update.rates.sh_rest, to.value.sh + k,
               to.first.sh + k, to.second.sh + k);
+  return true;
+}
+
+// The same of all coefficients of splat i, by vectors.
+inline bool UpdateColors(const SplatUpdate& update, int64_t i, int basis, const float* d_sh,
+                         const SplatMoments& to) {
+  float sum = 0;
+  for (int k = 0; k < 3 * basis; ++k) sum += std::abs(d_sh[k]);
+  if (!(sum < kLargestGradient)) return false;
+  for (int c = 0; c < 3; ++c) {
+    const int64_t row = (3 * i + c) * basis;
+    UpdateColor(update, true, d_sh[c * basis], row, to);
+    float *value = to.value.sh + row, *first = to.first.sh + row, *second = to.second.sh + row;
+#pragma omp simd
+    for (int b = 1; b < basis; ++b)
+      update.Step(d_sh[c * basis + b], update.rates.sh_rest, value + b, first + b, second + b);
+  }
   return true;
 }
 

@@ -10,6 +10,7 @@
 #include "pipeline/program/option_binding.h"
 #include "pipeline/program/run_options.h"
 #include "reconstruct/fit/fit_options.h"
+#include "reconstruct/splats/splat_fit_options.h"
 #include "stylize/training/train_network.h"
 
 namespace regrade {
@@ -50,6 +51,21 @@ struct FitPackedOptions {
     bind("max-memory", max_memory_gb,
          {.unit = "GB", .help = kMaxMemoryHelp, .min = 0, .max = 1e6});
     bind("reproducible", reproducible, {.help = "two fits give the same bytes"});
+  }
+};
+
+struct FitSplatsOptions {
+  std::string capture;  // packed
+  std::string frames;   // folder for pictures; empty: none
+  std::string device = "cuda";
+  uint64_t seed = 0;
+
+  template <typename Bind>
+  void Describe(Bind& bind) {
+    bind("capture", capture, {.help = "a file of `regrade pack`"});
+    bind("frames", frames, {.help = "a folder for .ppm pictures of the held-out views"});
+    bind("device", device, {.help = "where arithmetic runs", .choices = "cpu|cuda"});
+    bind("seed", seed, {.help = "seed of all random numbers"});
   }
 };
 
@@ -131,5 +147,9 @@ void StylePacked(const StylePackedOptions& settings, const TrainNetworkOptions& 
 // are of this call. The grid is lowered to memory as `regrade run` does. `bound` has `settings`
 // and `fit`, which --preset paper sets by the capture. Throws Interrupted after --stop-after.
 void FitPacked(const FitPackedOptions& settings, const FitOptions& fit, OptionSet* bound);
+
+// Fits splats; prints one line of JSON like FitPacked's. Photos with a lens are undistorted,
+// and so are those that are measured.
+void FitSplatsPacked(const FitSplatsOptions& settings, const SplatFitOptions& fit);
 
 }  // namespace regrade

@@ -9,6 +9,9 @@ bool GpuSettings::Bind(const std::string& command, OptionSet* options) {
   if (command == "fit") {
     options->Add("Capture", &fit_packed);
     options->Add("Fit", &fit);
+  } else if (command == "splats") {
+    options->Add("Capture", &fit_splats);
+    options->Add("Fit", &splats);
   } else if (command == "style") {
     options->Add("Capture", &style_packed);
     options->Add("Network", &network);

@@ -12,11 +12,13 @@ namespace regrade {
 struct GpuSettings {
   FitPackedOptions fit_packed;
   FitOptions fit;
+  FitSplatsOptions fit_splats;
+  SplatFitOptions splats;
   StylePackedOptions style_packed;
   TrainNetworkOptions network;
   RenderPackedOptions render_packed;
 
-  // Adds the options of "fit", "style" or "render"; false for another command.
+  // Adds the options of "fit", "splats", "style" or "render"; false for another command.
   bool Bind(const std::string& command, OptionSet* options);
 };
 

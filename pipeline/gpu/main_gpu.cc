@@ -18,6 +18,8 @@ constexpr char kUsage[] =
     "usage: regrade_gpu device                       prints the card's name and memory\n"
     "       regrade_gpu fit --capture FILE [OPTIONS]   fits a field to a file of `regrade "
     "pack`\n"
+    "       regrade_gpu splats --capture FILE [OPTIONS]\n"
+    "                                                fits splats to it, and measures them\n"
     "       regrade_gpu style --capture FILE --field FILE [OPTIONS]\n"
     "                                                restyles it after the file's style "
     "picture\n"
@@ -53,6 +55,8 @@ bool Run(const std::vector<std::string>& arguments) {
   ReadFlags(rest, &options);
   if (command == "fit")
     FitPacked(settings.fit_packed, settings.fit, &options);
+  else if (command == "splats")
+    FitSplatsPacked(settings.fit_splats, settings.splats);
   else if (command == "render")
     RenderPacked(settings.render_packed);
   else

@@ -28,8 +28,8 @@ class SplatFitter {
               const SplatFitOptions& options, const SplatFitHooks& hooks, Backend backend)
       : views_(views), box_(box), options_(options), hooks_(hooks), photos_(views) {
     const SplatOptions render = SplatOptionsFor(box, options.antialiased);
-    engine_ = backend == Backend::kCuda ? MakeCudaSplatEngine(render)
-                                        : MakeCpuSplatEngine(render);
+    engine_ =
+        backend == Backend::kCuda ? MakeCudaSplatEngine(render) : MakeCpuSplatEngine(render);
     extent_ = static_cast<float>(SceneExtent(photos_, box));
     most_ = static_cast<int64_t>(options.thousands * 1000);
   }
@@ -40,7 +40,7 @@ class SplatFitter {
       state = std::move(*hooks_.resume);
     } else {
       state.splats = InitialSplats(views_, photos_, box_, options_);
-      if (box_.background) state.splats.background = *box_.background;
+      state.splats.background = box_.background.value_or(photos_.mean_color());
       state.first_moment = Splats(state.splats.count(), 1);
       state.second_moment = state.first_moment;
     }
@@ -66,6 +66,7 @@ class SplatFitter {
     engine_->ReadState([&](SplatFitState* end) { result.splats = end->splats; });
     result.psnr_train_db = Psnr(tally_.tail_error, tally_.tail_values);
     result.rejected = tally_.rejected;
+    result.entries_per_step = static_cast<double>(tally_.entries) / std::max(1, options_.steps);
     result.curve = std::move(tally_.curve);
     return result;
   }
@@ -91,10 +92,10 @@ class SplatFitter {
       order_.resize(static_cast<size_t>(n));
       std::iota(order_.begin(), order_.end(), 0);
       for (int k = n - 1; k > 0; --k)
-        std::swap(order_[static_cast<size_t>(k)],
-                  order_[RandomIndex(options_.seed ^ kRandomSplatViews,
-                                     static_cast<uint64_t>(round), static_cast<uint64_t>(k),
-                                     static_cast<uint64_t>(k) + 1)]);
+        std::swap(
+            order_[static_cast<size_t>(k)],
+            order_[RandomIndex(options_.seed ^ kRandomSplatViews, static_cast<uint64_t>(round),
+                               static_cast<uint64_t>(k), static_cast<uint64_t>(k) + 1)]);
     }
     return order_[static_cast<size_t>(step_ % n)];
   }
@@ -102,8 +103,8 @@ class SplatFitter {
   void Step() {
     if (step_ == At(options_.small_until) && step_ > 0) ChoosePhotos();
     Populate();
-    const int degree = std::min(
-        options_.sh_degree, step_ / std::max(1, At(options_.degree_each)));
+    const int degree =
+        std::min(options_.sh_degree, step_ / std::max(1, At(options_.degree_each)));
     if (BasisOfDegree(degree) > engine_->basis()) engine_->SetBasis(BasisOfDegree(degree));
     SplatStep step;
     step.photo = PhotoOfStep();
@@ -172,7 +173,7 @@ class SplatFitter {
     const SplatFitSums sums = engine_->TakeSums();
     tally_.window_error += sums.picture.squared;
     tally_.window_values += sums.picture.values;
-    tally_.pairs += sums.pairs;
+    tally_.entries += sums.entries;
     tally_.rejected += sums.rejected;
   }
 

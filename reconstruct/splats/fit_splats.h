@@ -22,11 +22,12 @@ struct SplatCurvePoint {
   int64_t splats = 0;
 };
 
-// Running sums of a fit: window_* since the last point of the curve, tail_* over the last tenth.
+// Running sums of a fit: window_* since the last point of the curve, tail_* over the last
+// tenth.
 struct SplatFitTally {
   double window_error = 0, tail_error = 0;
   int64_t window_values = 0, tail_values = 0;
-  int64_t pairs = 0, rejected = 0;
+  int64_t entries = 0, rejected = 0;
   std::vector<SplatCurvePoint> curve;
 };
 
@@ -41,7 +42,8 @@ struct SplatFitResult {
   Splats splats;
   double psnr_train_db = 0;
   int64_t rejected = 0;
-  double seconds = 0;  // of this call, without checkpoints
+  double entries_per_step = 0;  // splats in tiles, which work grows with
+  double seconds = 0;           // of this call, without checkpoints
   std::vector<SplatCurvePoint> curve;
 };
 

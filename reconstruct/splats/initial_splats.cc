@@ -54,8 +54,8 @@ std::vector<Start> StartsAtPoints(const std::vector<TrainingView>& views,
 }
 
 // Adds random places of the box that two photos see, up to `count` starts.
-void AddRandomStarts(const SplatPhotos& photos, const SceneBox& box, uint64_t seed, size_t count,
-                     std::vector<Start>* starts) {
+void AddRandomStarts(const SplatPhotos& photos, const SceneBox& box, uint64_t seed,
+                     size_t count, std::vector<Start>* starts) {
   constexpr uint64_t kTries = 20;
   const int least = std::min(2, photos.count());
   const uint64_t tries = kTries * count;
@@ -91,8 +91,7 @@ std::vector<double> Spacings(const std::vector<Start>& starts) {
     double square = 0;
     for (const Entry& entry : near)
       square += bg::comparable_distance(entry.first, entries[i].first);
-    spacings[i] =
-        std::sqrt(square / static_cast<double>(std::max<size_t>(1, near.size() - 1)));
+    spacings[i] = std::sqrt(square / static_cast<double>(std::max<size_t>(1, near.size() - 1)));
   }
   return spacings;
 }
@@ -103,7 +102,8 @@ Splats InitialSplats(const std::vector<TrainingView>& views, const SplatPhotos& 
                      const SceneBox& box, const SplatFitOptions& options) {
   std::vector<Start> starts = StartsAtPoints(views, photos);
   const size_t most = static_cast<size_t>(options.thousands * 1000);
-  AddRandomStarts(photos, box, options.seed, std::min<size_t>(kFewPoints, most), &starts);
+  if (starts.size() < kLeastPoints)
+    AddRandomStarts(photos, box, options.seed, std::min(kRandomStarts, most), &starts);
   if (starts.empty())
     throw SceneError(Concat("no place is seen by two of the ", photos.count(),
                             " photos that are fitted: wrong poses, or too few"),

@@ -9,13 +9,15 @@
 
 namespace regrade {
 
-// Fewer points than this are completed by random places that two photos see.
-inline constexpr int kFewPoints = 10000;
+// Without this many points, splats begin at random places that two photos see. With few points
+// they do not: what begins in the air between the cameras explains single photos, and stays
+// there (6 dB on the flash photos, of 500 points).
+inline constexpr size_t kLeastPoints = 50;
+inline constexpr size_t kRandomStarts = 20000;
 
 // One for each point that the photos saw, of the mean colour of the pixels that show it, round,
 // as wide as initial_scale times the root mean square of the distances to its three nearest
-// neighbours; and random ones in the box, where there are few points. Harmonics of degree 0.
-// Throws Error(kScene) if no place is seen by two photos.
+// neighbours. Harmonics of degree 0. Throws Error(kScene) if no place is seen by two photos.
 Splats InitialSplats(const std::vector<TrainingView>& views, const SplatPhotos& photos,
                      const SceneBox& box, const SplatFitOptions& options);
 

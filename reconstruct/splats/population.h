@@ -1,6 +1,6 @@
 // How splats multiply and move during a fit, Kheradmand et al. 2024, section 3.3: dead ones go
-// to places drawn by opacity, and new ones begin there. What is drawn depends on opacities, seed
-// and step alone.
+// to places drawn by opacity, and new ones begin there. What is drawn depends on opacities,
+// seed and step alone.
 #pragma once
 
 #include <cstdint>

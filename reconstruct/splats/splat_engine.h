@@ -24,7 +24,7 @@ struct SplatStep {
 
 struct SplatFitSums {
   PictureSums picture;
-  int64_t pairs = 0;     // entries of splats in tiles
+  int64_t entries = 0;   // splats in tiles
   int64_t rejected = 0;  // updates of splats, for a gradient that is not finite
 };
 

@@ -46,18 +46,17 @@ class CpuSplatEngine : public SplatEngine {
     const SplatMoments to{PointersOf(&state_.splats), PointersOf(&state_.first_moment),
                           PointersOf(&state_.second_moment)};
     std::atomic<int64_t> rejected = 0;
-    ForEachGradient(frame_, tile_sums_, [&](int64_t i, const Splat<float>& d, const float* d_sh) {
-      bool sound = UpdateShape(step.update, i, d, to);
-      const int basis = frame_.splats.basis;
-      for (int k = 0; k < 3 * basis; ++k)
-        sound &= UpdateColor(step.update, k % basis == 0, d_sh[k], 3 * basis * i + k, to);
-      rejected += !sound;
-    });
+    ForEachGradient(
+        frame_, tile_sums_, [&](int64_t i, const Splat<float>& d, const float* d_sh) {
+          const bool sound = UpdateShape(step.update, i, d, to) &
+                             UpdateColors(step.update, i, frame_.splats.basis, d_sh, to);
+          rejected += !sound;
+        });
     sums_.picture.absolute += sums.absolute;
     sums_.picture.squared += sums.squared;
     sums_.picture.similarity += sums.similarity;
     sums_.picture.values += sums.values;
-    sums_.pairs += std::ssize(frame_.entry_splat);
+    sums_.entries += std::ssize(frame_.entry_splat);
     sums_.rejected += rejected;
   }
 

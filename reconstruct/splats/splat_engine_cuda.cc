@@ -61,7 +61,9 @@ class CudaSplatEngine : public SplatEngine {
     return logits;
   }
 
-  void Change(const PopulationChange& change) override { ApplyChangeOnDevice(change, &splats_); }
+  void Change(const PopulationChange& change) override {
+    ApplyChangeOnDevice(change, &splats_);
+  }
 
   void SetBasis(int basis) override {
     for (DeviceSplats* splats : {&splats_.value, &splats_.first, &splats_.second}) {
@@ -88,7 +90,7 @@ class CudaSplatEngine : public SplatEngine {
   SplatFitSums TakeSums() override {
     SplatFitSums sums;
     sums.picture = loss_.TakeSums();
-    sums.pairs = std::exchange(entries_, 0);
+    sums.entries = std::exchange(entries_, 0);
     uint32_t rejected = 0;
     rejected_.CopyOut(&rejected, 1);
     rejected_.Zero();

@@ -53,4 +53,17 @@ int64_t SplatPhotos::num_pixels() const {
   return pixels;
 }
 
+Vec3f SplatPhotos::mean_color() const {
+  Vec3d sum{};
+  int64_t count = 0;
+  for (const SplatPhoto& photo : photos_)
+    for (size_t pixel = 0; 3 * pixel < photo.color.size(); ++pixel) {
+      if (!photo.masked.empty() && photo.masked[pixel] != 0) continue;
+      for (size_t c = 0; c < 3; ++c)
+        sum[static_cast<int>(c)] += photo.color[3 * pixel + c] / 65535.0;
+      ++count;
+    }
+  return (sum / static_cast<double>(count)).Cast<float>();
+}
+
 }  // namespace regrade

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "kernels/base/vec.h"
 #include "kernels/scene/camera.h"
 #include "kernels/scene/image.h"
 #include "reconstruct/fit/training_rays.h"
@@ -26,6 +27,7 @@ class SplatPhotos {
   int count() const { return static_cast<int>(photos_.size()); }
   const SplatPhoto& operator[](int i) const { return photos_[static_cast<size_t>(i)]; }
   int64_t num_pixels() const;
+  Vec3f mean_color() const;  // sRGB, of all pixels that are not masked
 
  private:
   std::vector<SplatPhoto> photos_;

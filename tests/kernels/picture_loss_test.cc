@@ -133,7 +133,8 @@ TEST(PictureLoss, FastIsPlain) {
   ExpectFastIsPlain(pair);
 }
 
-// A flat white picture has no variance: float's G x^2 - (G x)^2 may be below 0, by less than C2.
+// A flat white picture has no variance: float's G x^2 - (G x)^2 may be below 0, by less than
+// C2.
 TEST(PictureLoss, AFlatPictureIsSound) {
   std::vector<uint16_t> photo(3 * 64 * 64, 65535);
   std::vector<float> picture(photo.size(), 1.0f), d(photo.size());

@@ -10,8 +10,8 @@ namespace regrade {
 
 namespace {
 
-constexpr int kSide = 16;                        // pixels of a block, both sides
-constexpr int kWide = kSide + 2 * kSsimReach;    // with what its windows reach
+constexpr int kSide = 16;                      // pixels of a block, both sides
+constexpr int kWide = kSide + 2 * kSsimReach;  // with what its windows reach
 constexpr int kTaps = 2 * kSsimReach + 1;
 constexpr int kThreadsOfBlock = kSide * kSide;
 __constant__ float kTap[kTaps];
@@ -82,7 +82,8 @@ __global__ void __launch_bounds__(kThreadsOfBlock)
     SlopesKernel(Pixels pixels, float weight, float* slopes, float* d, PictureSums* of_block) {
   __shared__ float own[kWide][kWide], seen[kWide][kWide], rows[5][kWide][kSide];
   const int thread = static_cast<int>(threadIdx.x);
-  const int x0 = static_cast<int>(blockIdx.x) * kSide, y0 = static_cast<int>(blockIdx.y) * kSide;
+  const int x0 = static_cast<int>(blockIdx.x) * kSide,
+            y0 = static_cast<int>(blockIdx.y) * kSide;
   const int x = x0 + thread % kSide, y = y0 + thread / kSide;
   const int64_t plane = 3 * static_cast<int64_t>(pixels.width) * pixels.height;
   PictureSums sums;
@@ -125,7 +126,8 @@ __global__ void __launch_bounds__(kThreadsOfBlock)
     GradientKernel(Pixels pixels, float weight, const float* slopes, float* d) {
   __shared__ float by[3][kWide][kWide], rows[3][kWide][kSide];
   const int thread = static_cast<int>(threadIdx.x);
-  const int x0 = static_cast<int>(blockIdx.x) * kSide, y0 = static_cast<int>(blockIdx.y) * kSide;
+  const int x0 = static_cast<int>(blockIdx.x) * kSide,
+            y0 = static_cast<int>(blockIdx.y) * kSide;
   const int x = x0 + thread % kSide, y = y0 + thread / kSide;
   const int64_t plane = 3 * static_cast<int64_t>(pixels.width) * pixels.height;
   for (int c = 0; c < 3; ++c) {
@@ -189,7 +191,7 @@ void DevicePictureLoss::Compare(int width, int height, const uint16_t* photo,
       pixels, (1 - lambda) * per_value, slopes_.data(), d_picture, of_block_.data());
   CheckLaunch("slopes_of_ssim");
   GradientKernel<<<blocks, kThreadsOfBlock, 0, LaunchStream()>>>(pixels, lambda * per_value,
-                                                                  slopes_.data(), d_picture);
+                                                                 slopes_.data(), d_picture);
   CheckLaunch("gradient_of_ssim");
   AddKernel<<<1, kThreadsOfBlock, 0, LaunchStream()>>>(of_block_.data(), count, sums_.data());
   CheckLaunch("sums_of_pictures");

@@ -15,8 +15,8 @@ class DevicePictureLoss {
   // Pointers are to device memory; see Compare. Writes d_picture, and adds to the sums.
   void Compare(int width, int height, const uint16_t* photo, const uint8_t* masked,
                const float* picture, float lambda, float* d_picture);
-  // The sums since the last call; waits. Blocks of pixels are summed in double, in an order that
-  // does not depend on the device's scheduling.
+  // The sums since the last call; waits. Blocks of pixels are summed in double, in an order
+  // that does not depend on the device's scheduling.
   PictureSums TakeSums();
 
  private:

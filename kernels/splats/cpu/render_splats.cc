@@ -9,8 +9,7 @@ namespace regrade {
 
 void RenderSplats(const SplatFrame& frame, SplatPicture<float>* picture,
                   const SplatTileFunctions& tiles) {
-  REGRADE_CHECK(picture->width == frame.camera.width &&
-                picture->height == frame.camera.height);
+  REGRADE_CHECK(picture->width == frame.camera.width && picture->height == frame.camera.height);
 #pragma omp parallel for schedule(dynamic, 1)
   for (int tile = 0; tile < frame.num_tiles(); ++tile) tiles.render(frame, tile, picture);
 }

@@ -27,8 +27,8 @@ struct SplatFrame {
   int num_tiles() const { return tiles_x * tiles_y; }
 };
 
-// Requires what SeeSplats does. The result does not depend on the number of threads, nor on what
-// the frame held before, whose memory is used again.
+// Requires what SeeSplats does. The result does not depend on the number of threads, nor on
+// what the frame held before, whose memory is used again.
 void MakeSplatFrame(const SplatsView<float>& splats, const Camera& camera,
                     const SplatOptions& options, SplatFrame* frame);
 SplatFrame MakeSplatFrame(const SplatsView<float>& splats, const Camera& camera,

@@ -46,9 +46,9 @@ void SplatTape::Reserve(const SplatFrame& frame, int tile) {
        e < frame.first_entry[static_cast<size_t>(tile) + 1]; ++e) {
     const PixelBox& box =
         frame.box[static_cast<size_t>(frame.entry_splat[static_cast<size_t>(e)])];
-    rows += std::min(std::min(box.y1, top + kSplatTile) - std::max(box.y0, top) +
-                         2 * (kHighest - 1),
-                     kSplatTile);
+    rows += std::min(
+        std::min(box.y1, top + kSplatTile) - std::max(box.y0, top) + 2 * (kHighest - 1),
+        kSplatTile);
   }
   transmittance.Reserve(rows * kSplatTile);
   alpha.Reserve(rows * kSplatTile);

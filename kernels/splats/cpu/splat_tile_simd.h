@@ -53,8 +53,7 @@ struct TileSplat {
 
   // w of the pixels of a part.
   void Whiten(int part, Wide* w0, Wide* w1) const {
-    const Wide across =
-        PartX() + (dx + static_cast<float>(part % kPartsInRow * kPartWidth));
+    const Wide across = PartX() + (dx + static_cast<float>(part % kPartsInRow * kPartWidth));
     const Wide down = PartY() + (dy + static_cast<float>(part / kPartsInRow * kPartHeight));
     *w0 = across * inverse00;
     *w1 = (down - c10 * *w0) * inverse11;

@@ -1,8 +1,7 @@
-#include "kernels/splats/cuda/device_splat_update.h"
-
 #include <algorithm>
 
 #include "kernels/device/launch_size.h"
+#include "kernels/splats/cuda/device_splat_update.h"
 
 namespace regrade {
 
@@ -39,14 +38,14 @@ struct UpdateUse {
   }
 };
 
-__global__ void UnseenShapesKernel(SplatUpdate update, SplatMoments to, const int32_t* num_tiles,
-                                   int64_t count) {
+__global__ void UnseenShapesKernel(SplatUpdate update, SplatMoments to,
+                                   const int32_t* num_tiles, int64_t count) {
   const int64_t i = blockIdx.x * static_cast<int64_t>(blockDim.x) + threadIdx.x;
   if (i < count && num_tiles[i] == 0) UpdateShape(update, i, {}, to);
 }
 
-__global__ void UnseenColorsKernel(SplatUpdate update, SplatMoments to, const int32_t* num_tiles,
-                                   int64_t count, int basis) {
+__global__ void UnseenColorsKernel(SplatUpdate update, SplatMoments to,
+                                   const int32_t* num_tiles, int64_t count, int basis) {
   const int64_t k = blockIdx.x * static_cast<int64_t>(blockDim.x) + threadIdx.x;
   if (k >= 3 * basis * count || num_tiles[k / (3 * basis)] != 0) return;
   UpdateColor(update, k % basis == 0, 0, k, to);

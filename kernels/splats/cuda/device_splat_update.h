@@ -16,8 +16,8 @@ struct DeviceSplatMoments {
   SplatMoments pointers() const;
 };
 
-// Steps all splats: by their gradients those that were seen, by zeros the others. `rejected` [1]
-// in device memory counts gradients that are not finite.
+// Steps all splats: by their gradients those that were seen, by zeros the others. `rejected`
+// [1] in device memory counts gradients that are not finite.
 void UpdateSplats(const SplatUpdate& update, const SplatSumsView& gradients,
                   const DeviceSplatMoments& splats, uint32_t* rejected);
 
