@@ -9,16 +9,28 @@
 namespace regrade {
 namespace {
 
-// Where the camera's photo shows image point (u, v) of a lens without distortion.
-struct Place {
-  double u = 0, v = 0;
-  bool in_front = false;
-};
-
-Place PlaceOf(const Camera& own, const Camera& plain, double u, double v) {
-  Place place;
-  place.in_front = own.Project(plain.CameraRay(u, v), &place.u, &place.v);
-  return place;
+// The largest |(x, y)| of directions (x, y, 1), up to `most`, within which image points move
+// outwards with it; beyond, the lens folds over.
+double FoldRadius(const Camera& own, double most) {
+  constexpr int kDirections = 32, kSteps = 1000;
+  double u0 = 0, v0 = 0;
+  own.Project({0, 0, 1}, &u0, &v0);
+  for (int d = 0; d < kDirections; ++d) {
+    const double angle = 2 * M_PI * d / kDirections;
+    double before = -1;
+    for (int i = 0; i <= kSteps; ++i) {
+      const double r = most * i / kSteps;
+      double u, v;
+      own.Project({r * std::cos(angle), r * std::sin(angle), 1}, &u, &v);
+      const double distance = std::hypot(u - u0, v - v0);
+      if (!(distance > before)) {
+        most = r;
+        break;
+      }
+      before = distance;
+    }
+  }
+  return most;
 }
 
 void CubicWeights(double t, double* w) {
@@ -58,21 +70,20 @@ Image UndistortPhoto(const Image& photo, const Camera& camera) {
   own.ndc = {};
   const Camera plain = own.Undistorted();
   Image result(photo.width, photo.height, photo.channels);
-  constexpr float kNone = std::numeric_limits<float>::quiet_NaN();
+  const double farthest = std::hypot(std::max(plain.cx, plain.width - plain.cx) / plain.fx,
+                                     std::max(plain.cy, plain.height - plain.cy) / plain.fy);
+  const double fold = FoldRadius(own, farthest * 1.01);
 #pragma omp parallel for schedule(dynamic, 4)
-  for (int y = 0; y < photo.height; ++y) {
-    Place next = PlaceOf(own, plain, 0.5, y + 0.5);
+  for (int y = 0; y < photo.height; ++y)
     for (int x = 0; x < photo.width; ++x) {
-      const Place at = next, below = PlaceOf(own, plain, x + 0.5, y + 1.5);
-      next = PlaceOf(own, plain, x + 1.5, y + 0.5);
-      const double area = (next.u - at.u) * (below.v - at.v) -
-                          (next.v - at.v) * (below.u - at.u);  // negative where it folds over
-      const bool seen = at.in_front && area > 0 && at.u >= 0 && at.v >= 0 &&
-                        at.u <= photo.width && at.v <= photo.height;
+      const Vec3d ray = plain.CameraRay(x + 0.5, y + 0.5);
+      double u, v;
+      const bool seen = std::hypot(ray.x, ray.y) < fold && own.Project(ray, &u, &v) && u >= 0 &&
+                        v >= 0 && u <= photo.width && v <= photo.height;
       for (int c = 0; c < photo.channels; ++c)
-        result.at(x, y)[c] = seen ? SampleCubic(photo, at.u - 0.5, at.v - 0.5, c) : kNone;
+        result.at(x, y)[c] = seen ? SampleCubic(photo, u - 0.5, v - 0.5, c)
+                                  : std::numeric_limits<float>::quiet_NaN();
     }
-  }
   return result;
 }
 

@@ -1,4 +1,5 @@
-// regrade_gpu splats: a packed capture becomes splats, measured on the views that were kept back.
+// regrade_gpu splats: a packed capture becomes splats, measured on the views that were kept
+// back.
 #include <cstdio>
 #include <filesystem>
 
@@ -72,7 +73,8 @@ void FitSplatsPacked(const FitSplatsOptions& settings, const SplatFitOptions& fi
   const double read_seconds = ClockSeconds() - start;
   const SplatFitResult result = FitSplats(views, capture.scene.box, options, hooks, backend);
   JsonValue::Array curve;
-  for (size_t i = 0; i < result.curve.size(); i += std::max<size_t>(1, result.curve.size() / 100))
+  for (size_t i = 0; i < result.curve.size();
+       i += std::max<size_t>(1, result.curve.size() / 100))
     curve.push_back(JsonValue::Array{result.curve[i].seconds, result.curve[i].psnr_train_db,
                                      result.curve[i].splats});
   const JsonValue record = JsonValue::Object{

@@ -17,7 +17,9 @@ constexpr double kLeastOpacity = kDeadOpacity, kMostOpacity = 1 - 1e-6;
 
 double OpacityOf(float logit) { return std::exp(LogSigmoid(double{logit})); }
 
-bool IsDead(float logit) { return !(OpacityOf(logit) >= kDeadOpacity); }
+bool IsDead(float logit) {
+  return !std::isfinite(logit) || OpacityOf(logit) < double{kDeadOpacity};
+}
 
 // Copies to the places `to`, of splats drawn by opacity.
 PopulationChange CopyTo(const std::vector<float>& logits, const std::vector<int32_t>& to,

@@ -42,8 +42,8 @@ TEST_F(DeviceSplatFit, LossIsThatOfTheHost) {
   }
   for (size_t p = 0; p < masked.size(); p += 97) masked[p] = 1;
   LossRows rows;
-  const PictureSums host = Compare(kWidth, kHeight, photo.data(), masked.data(),
-                                   picture.data(), 0.2f, &rows, expected.data());
+  const PictureSums host = Compare(kWidth, kHeight, photo.data(), masked.data(), picture.data(),
+                                   0.2f, &rows, expected.data());
   DeviceBuffer<uint16_t> photo_there(3 * kPixels, "photo");
   DeviceBuffer<uint8_t> masked_there(kPixels, "mask");
   DeviceBuffer<float> picture_there(3 * kPixels, "picture"), d_there(3 * kPixels, "gradient");
