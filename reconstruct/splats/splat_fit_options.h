@@ -9,7 +9,8 @@ namespace regrade {
 
 // Constants are those of Kheradmand et al. 2024, whose schedule has 30000 steps and scales with
 // them, but for: initial_scale (0.1 there) and both weights (0.01), which leave fewer holes and
-// needles between few photos, and the steps at half size.
+// needles between few photos, and the steps at half size. Fits of few steps raise their rates,
+// see FitSplats.
 struct SplatFitOptions {
   int steps = 15000;
   float thousands = 1000;  // of splats, at most

@@ -94,7 +94,7 @@ TEST_F(DeviceSplatFit, PopulationChangesAsOnTheHost) {
 // Adam divides by the gradient's size, so that a gradient of rounding errors alone, of a splat
 // that hardly counts, may go either way: most values agree, and pictures do.
 TEST_F(DeviceSplatFit, StepsAreThoseOfTheHost) {
-  fit_.steps = 40;
+  fit_.steps = 15;
   std::vector<Image> pictures;
   SplatFitHooks hooks;
   hooks.measure = [&](SplatEngine* engine) {
