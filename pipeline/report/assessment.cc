@@ -29,6 +29,18 @@ bool IsOneMap(const RunReport& report) {
          OptionIs(report, "scene-wide", "true");
 }
 
+// The next finer preset; empty for the finest and for those that follow the papers.
+std::string FinerPreset(const std::string& preset) {
+  return preset == "smoke"      ? "draft"
+         : preset == "draft"    ? "standard"
+         : preset == "standard" ? "best"
+                                : "";
+}
+
+std::string RunAgain(const std::string& preset) {
+  return "run again with --preset " + FinerPreset(preset) + " and another --out";
+}
+
 // "photos are far apart: add some between 00.png and 02.png; 01.png was not placed".
 std::string MorePhotos(const PhotoSpacing& spacing) {
   constexpr size_t kMostNames = 3;
@@ -56,10 +68,11 @@ Part Sharp(const RunReport& report) {
                          held_out ? "" : "fitted ");
   if (!fit->sharpness.empty()) part.sentence += " (" + fit->sharpness + ")";
   part.grade = *kept.value / 0.9;
+  const std::string finer = FinerPreset(report.preset);
   part.advice = report.preset == "draft"
-                    ? "run again with --preset standard and another --out: its field is finer"
-                    : "more photos from nearby, held still, make the scene sharper; --preset "
-                      "best has a finer field";
+                    ? RunAgain(report.preset) + ": its field is finer"
+                    : "more photos from nearby, held still, make the scene sharper" +
+                          (finer.empty() ? "" : "; --preset " + finer + " has a finer field");
   if (LacksPhotos(*fit) && report.spacing) part.advice = MorePhotos(*report.spacing);
   return part;
 }
@@ -150,6 +163,9 @@ Assessment AssessmentOf(const RunReport& report) {
                           ? weakest->advice
                           : "nothing is weak; `regrade render` makes larger and longer films "
                             "(--film-size, --film-seconds)";
+  if (report.preset == "smoke")
+    assessment.advice =
+        "smoke only shows that everything runs: " + RunAgain(report.preset);
   return assessment;
 }
 

@@ -70,6 +70,24 @@ TEST(Assessment, WherePhotosAreMissingTheAdviceNamesThePlace) {
   EXPECT_NE(AssessmentOf(dense).advice.find("--preset standard"), std::string::npos);
 }
 
+TEST(Assessment, TheAdviceNamesTheNextPreset) {
+  RunReport soft = SoftDraft(29, 27.5);
+  const auto advice = [&](const std::string& preset) {
+    soft.preset = preset;
+    return AssessmentOf(soft).advice;
+  };
+  for (const auto& [preset, next] : {std::pair{"smoke", "draft"},
+                                     {"draft", "standard"},
+                                     {"standard", "best"}})
+    EXPECT_NE(advice(preset).find(std::string("--preset ") + next), std::string::npos)
+        << advice(preset);
+  for (const char* finest : {"best", "paper"})
+    EXPECT_EQ(advice(finest).find("--preset"), std::string::npos) << advice(finest);
+  // Of a smoke run nothing else is to be mended.
+  soft.stages.reconstruct.reset();
+  EXPECT_NE(advice("smoke").find("--preset draft"), std::string::npos) << advice("smoke");
+}
+
 TEST(Assessment, SteadyIsTheFilms) {
   RunReport report;
   report.stages.render = RenderReport{.path_frames = 60};
