@@ -84,8 +84,10 @@ const ConsistencyMetrics* Nearest(const RunReport& report, const std::string& se
   return found;
 }
 
-// Of the film; one along the photos' places (--path views) has no frames of its own.
+// Of the film; one along the photos' places (--path views) has no frames of its own. Without a
+// film (--no-films) of the photos' places.
 Part Steady(const RunReport& report) {
+  const bool film = !report.stages.render || report.stages.render->film_frames > 0;
   const bool own_frames = report.stages.render && report.stages.render->path_frames > 0;
   const auto of_film = [&](const char* sequence) {
     return Nearest(report, (own_frames ? kPathPrefix : "") + std::string(sequence));
@@ -94,7 +96,7 @@ Part Steady(const RunReport& report) {
   const bool frame_by_frame = other != nullptr;
   if (!frame_by_frame) other = of_film("source");
   if (styled == nullptr || other == nullptr) return {"steady: not measured", ""};
-  if (styled->tc_psnr_mean_db.infinite) return {"steady: nothing of the film flickers", "", 1};
+  if (styled->tc_psnr_mean_db.infinite) return {film ? "steady: nothing of the film flickers" : "steady: nothing flickers", "", 1};
   for (const ConsistencyMetrics* row : {styled, other})
     if (!row->tc_psnr_mean_db.value)
       return {"steady: not measured (" + row->tc_psnr_mean_db.why + ")", ""};
@@ -102,10 +104,11 @@ Part Steady(const RunReport& report) {
   const std::string than = frame_by_frame ? "frame by frame" : "the scene before styling";
   constexpr double kNoDifference = 0.05;  // below what is printed
   Part part;
-  part.sentence = std::abs(gain) < kNoDifference
-                      ? "steady: the film is as steady as " + than
-                      : Format("steady: the film is %.1f dB %s than %s", std::abs(gain),
-                               gain > 0 ? "steadier" : "less steady", than.c_str());
+  part.sentence = film ? "steady: the film is " : "steady: neighbouring views are ";
+  part.sentence += std::abs(gain) < kNoDifference
+                       ? "as steady as " + than
+                       : Format("%.1f dB %s than %s", std::abs(gain),
+                                gain > 0 ? "steadier" : "less steady", than.c_str());
   part.grade = 1 + std::min(0.0, gain) / 3;  // 3 dB twice the squared error
   part.advice = IsOneMap(report)
                     ? "--strength 0.7 applies less of the style, which is steadier"

@@ -90,7 +90,7 @@ TEST(Assessment, TheAdviceNamesTheNextPreset) {
 
 TEST(Assessment, SteadyIsTheFilms) {
   RunReport report;
-  report.stages.render = RenderReport{.path_frames = 60};
+  report.stages.render = RenderReport{.path_frames = 60, .film_frames = 120};
   report.evaluation.consistency = {Row("styled", 20), Row("views_2d", 25),
                                    Row("path_styled", 31), Row("path_views_2d", 30)};
   EXPECT_NE(AssessmentOf(report).sentences[1].find("1.0 dB steadier"), std::string::npos);
@@ -101,6 +101,10 @@ TEST(Assessment, SteadyIsTheFilms) {
   report.stages.render->path_frames = 60;
   report.evaluation.consistency.resize(2);
   EXPECT_EQ(AssessmentOf(report).sentences[1], "steady: not measured");
+  // With --no-films nothing is said of a film.
+  report.stages.render = RenderReport{};
+  EXPECT_EQ(AssessmentOf(report).sentences[1],
+            "steady: neighbouring views are 5.0 dB less steady than frame by frame");
 }
 
 }  // namespace
