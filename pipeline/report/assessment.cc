@@ -96,7 +96,8 @@ Part Steady(const RunReport& report) {
   const bool frame_by_frame = other != nullptr;
   if (!frame_by_frame) other = of_film("source");
   if (styled == nullptr || other == nullptr) return {"steady: not measured", ""};
-  if (styled->tc_psnr_mean_db.infinite) return {film ? "steady: nothing of the film flickers" : "steady: nothing flickers", "", 1};
+  if (styled->tc_psnr_mean_db.infinite)
+    return {film ? "steady: nothing of the film flickers" : "steady: nothing flickers", "", 1};
   for (const ConsistencyMetrics* row : {styled, other})
     if (!row->tc_psnr_mean_db.value)
       return {"steady: not measured (" + row->tc_psnr_mean_db.why + ")", ""};
@@ -167,8 +168,7 @@ Assessment AssessmentOf(const RunReport& report) {
                           : "nothing is weak; `regrade render` makes larger and longer films "
                             "(--film-size, --film-seconds)";
   if (report.preset == "smoke")
-    assessment.advice =
-        "smoke only shows that everything runs: " + RunAgain(report.preset);
+    assessment.advice = "smoke only shows that everything runs: " + RunAgain(report.preset);
   return assessment;
 }
 

@@ -76,9 +76,8 @@ TEST(Assessment, TheAdviceNamesTheNextPreset) {
     soft.preset = preset;
     return AssessmentOf(soft).advice;
   };
-  for (const auto& [preset, next] : {std::pair{"smoke", "draft"},
-                                     {"draft", "standard"},
-                                     {"standard", "best"}})
+  for (const auto& [preset, next] :
+       {std::pair{"smoke", "draft"}, {"draft", "standard"}, {"standard", "best"}})
     EXPECT_NE(advice(preset).find(std::string("--preset ") + next), std::string::npos)
         << advice(preset);
   for (const char* finest : {"best", "paper"})
