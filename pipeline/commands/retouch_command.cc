@@ -138,7 +138,7 @@ void UseEdit(const std::string& folder, const PhotoEdit& edit, RunSettings* sett
 void WriteEdit(const std::string& folder, const PhotoEdit& edit, const CaptureView& view) {
   fs::create_directories(folder);
   WriteFileAtomically(folder + "/" + kEditLut, CubeText(edit.table, "edit"));
-  const std::string layers = folder + "/layers", pictures = folder + "/retouched";
+  const std::string layers = folder + "/layers", pictures = folder + "/" + kRetouchedFolder;
   for (const std::string& made : {layers, pictures}) {
     fs::remove_all(made);
     if (edit.IsLocal()) fs::create_directories(made);

@@ -357,6 +357,10 @@ void RunTradeoff(const Command& command, const Arguments& arguments, Console* co
     console->Info(Concat(variants.size(), " variants, ", tradeoff.repeats,
                          " times each: about ", DurationText(all * tradeoff.repeats),
                          ", and a run of the base"));
+    const bool has_base = fs::exists(settings.run.out + "/base/field.npz");
+    if (!variants.empty())
+      SayLeastBudget(tradeoff, has_base ? 0 : estimate.BaseSeconds(photos, style),
+                     estimate.Seconds(variants.front()), console);
     return;
   }
   settings.run.device = "cpu";

@@ -29,6 +29,18 @@ bool IsOneMap(const RunReport& report) {
          OptionIs(report, "scene-wide", "true");
 }
 
+// The next finer preset; empty for the finest and for those that follow the papers.
+std::string FinerPreset(const std::string& preset) {
+  return preset == "smoke"      ? "draft"
+         : preset == "draft"    ? "standard"
+         : preset == "standard" ? "best"
+                                : "";
+}
+
+std::string RunAgain(const std::string& preset) {
+  return "run again with --preset " + FinerPreset(preset) + " and another --out";
+}
+
 // "photos are far apart: add some between 00.png and 02.png; 01.png was not placed".
 std::string MorePhotos(const PhotoSpacing& spacing) {
   constexpr size_t kMostNames = 3;
@@ -56,10 +68,11 @@ Part Sharp(const RunReport& report) {
                          held_out ? "" : "fitted ");
   if (!fit->sharpness.empty()) part.sentence += " (" + fit->sharpness + ")";
   part.grade = *kept.value / 0.9;
+  const std::string finer = FinerPreset(report.preset);
   part.advice = report.preset == "draft"
-                    ? "run again with --preset standard and another --out: its field is finer"
-                    : "more photos from nearby, held still, make the scene sharper; --preset "
-                      "best has a finer field";
+                    ? RunAgain(report.preset) + ": its field is finer"
+                    : "more photos from nearby, held still, make the scene sharper" +
+                          (finer.empty() ? "" : "; --preset " + finer + " has a finer field");
   if (LacksPhotos(*fit) && report.spacing) part.advice = MorePhotos(*report.spacing);
   return part;
 }
@@ -71,8 +84,10 @@ const ConsistencyMetrics* Nearest(const RunReport& report, const std::string& se
   return found;
 }
 
-// Of the film; one along the photos' places (--path views) has no frames of its own.
+// Of the film; one along the photos' places (--path views) has no frames of its own. Without a
+// film (--no-films) of the photos' places.
 Part Steady(const RunReport& report) {
+  const bool film = !report.stages.render || report.stages.render->film_frames > 0;
   const bool own_frames = report.stages.render && report.stages.render->path_frames > 0;
   const auto of_film = [&](const char* sequence) {
     return Nearest(report, (own_frames ? kPathPrefix : "") + std::string(sequence));
@@ -81,7 +96,8 @@ Part Steady(const RunReport& report) {
   const bool frame_by_frame = other != nullptr;
   if (!frame_by_frame) other = of_film("source");
   if (styled == nullptr || other == nullptr) return {"steady: not measured", ""};
-  if (styled->tc_psnr_mean_db.infinite) return {"steady: nothing of the film flickers", "", 1};
+  if (styled->tc_psnr_mean_db.infinite)
+    return {film ? "steady: nothing of the film flickers" : "steady: nothing flickers", "", 1};
   for (const ConsistencyMetrics* row : {styled, other})
     if (!row->tc_psnr_mean_db.value)
       return {"steady: not measured (" + row->tc_psnr_mean_db.why + ")", ""};
@@ -89,10 +105,11 @@ Part Steady(const RunReport& report) {
   const std::string than = frame_by_frame ? "frame by frame" : "the scene before styling";
   constexpr double kNoDifference = 0.05;  // below what is printed
   Part part;
-  part.sentence = std::abs(gain) < kNoDifference
-                      ? "steady: the film is as steady as " + than
-                      : Format("steady: the film is %.1f dB %s than %s", std::abs(gain),
-                               gain > 0 ? "steadier" : "less steady", than.c_str());
+  part.sentence = film ? "steady: the film is " : "steady: neighbouring views are ";
+  part.sentence += std::abs(gain) < kNoDifference
+                       ? "as steady as " + than
+                       : Format("%.1f dB %s than %s", std::abs(gain),
+                                gain > 0 ? "steadier" : "less steady", than.c_str());
   part.grade = 1 + std::min(0.0, gain) / 3;  // 3 dB twice the squared error
   part.advice = IsOneMap(report)
                     ? "--strength 0.7 applies less of the style, which is steadier"
@@ -150,6 +167,8 @@ Assessment AssessmentOf(const RunReport& report) {
                           ? weakest->advice
                           : "nothing is weak; `regrade render` makes larger and longer films "
                             "(--film-size, --film-seconds)";
+  if (report.preset == "smoke")
+    assessment.advice = "smoke only shows that everything runs: " + RunAgain(report.preset);
   return assessment;
 }
 

@@ -19,6 +19,33 @@ namespace regrade {
 // where a photo has none. Throws Error(kInput).
 std::vector<Image> LayersOf(const ResidualChoice& choice, const WorkingViews& views);
 
+// A layer as renders take it. What is darkened keeps its proportion, as under less light (see
+// EQ(view-scale)): where a render is lighter or darker than the picture that was edited, by a
+// voxel or by detail that it does not have, a difference would stay as large as it was on a
+// surface that is darker now. What is lightened is added.
+class RenderedEdit {
+ public:
+  RenderedEdit() = default;
+  // Of [H, W, 3]. `before`: the 2D method's picture of what was edited; where it is not known,
+  // an empty picture, and all of the layer is added.
+  RenderedEdit(const Image& before, const Image& layer);
+
+  bool empty() const { return added_.empty(); }
+  // Of a pixel, for c in 0 to 2: value * kept + added.
+  const float* kept(int x, int y) const { return kept_.at(x, y); }
+  const float* added(int x, int y) const { return added_.at(x, y); }
+  // The 2D method's picture of a render of the photo's view, with the edit; in [0, 1].
+  Image On(Image picture) const;
+
+ private:
+  Image kept_, added_;
+};
+
+// Of each view of `views`; empty where its photo has no layer. What was edited is told by the
+// pictures with the edit, the folder retouched/ beside that of the layers. Throws
+// Error(kInput).
+std::vector<RenderedEdit> EditsOf(const ResidualChoice& choice, const WorkingViews& views);
+
 class CarriedEdit {
  public:
   // `views` in the frame of `source`, the unstyled field, whose depth at the photos with a
@@ -28,15 +55,16 @@ class CarriedEdit {
 
   bool empty() const { return photos_.empty(); }
 
-  // Adds the layers to `picture`, the 2D method's [H, W, 3] of a render of `camera` with the
-  // depth of RenderedView. Where several photos see a surface, their mean is added. Returns
+  // Puts the edits onto `picture`, the 2D method's [H, W, 3] of a render of `camera` with the
+  // depth of RenderedView. Where several photos see a surface, their mean is taken. Returns
   // [H, W, 1]: 1 where such a photo sees the surface, else 0, where nothing was added.
   Image AddTo(const Camera& camera, const Image& depth, Image* picture) const;
 
  private:
   struct Photo {
     Camera camera;
-    Image layer, depth;
+    RenderedEdit edit;
+    Image depth;
   };
   std::vector<Photo> photos_;
 };

@@ -58,11 +58,13 @@ class ResidualFit {
       throw InputError("has no pictures of renders", "the 2D method", "leave --residual out");
   }
 
-  // What the styled field with `so_far` lacks, at the views, to method(render), plus `layer(i)`
-  // where there are layers. The fit begins at `start`, unless empty.
+  // What the styled field with `so_far` lacks, at the views, to method(render), with `edit(i)`
+  // where there are edits. The fit begins at `start`, unless empty, which is part of `so_far`:
+  // what the renderer shows of it counts, samples that it clamps at black among them.
   std::vector<Vec3d> Fit(const std::vector<int>& indices, const VoxelResidual& so_far,
-                         const std::function<Image(int)>& layer, const ResidualOptions& options,
-                         std::vector<Vec3d> start, const ProgressFunction& progress) const {
+                         const std::function<const RenderedEdit&(int)>& edit,
+                         const ResidualOptions& options, std::vector<Vec3d> start,
+                         const ProgressFunction& progress) const {
     RadianceField styled = styled_.field;
     if (!so_far.color.empty()) AddResidual(so_far, &styled.appearance);
     const FieldRenderer of_styled(styled, backend_);
@@ -77,18 +79,21 @@ class ResidualFit {
       const Camera camera = views_.CameraOf(i);
       const RenderedPair pair = of_source_.RenderWith(of_styled, camera);
       Image missing = Colors(stylizer_->Stylize(pair.view.color, i));
-      const Image more = layer ? layer(i) : Image();
-      for (size_t k = 0; k < missing.pixels.size(); ++k) {
-        const float wanted = missing.pixels[k] + (more.empty() ? 0.0f : more.pixels[k]);
-        missing.pixels[k] = std::clamp(wanted, 0.0f, 1.0f) - pair.other_color.pixels[k];
-      }
+      if (edit) missing = edit(i).On(std::move(missing));
+      for (size_t k = 0; k < missing.pixels.size(); ++k)
+        missing.pixels[k] =
+            std::clamp(missing.pixels[k], 0.0f, 1.0f) - pair.other_color.pixels[k];
       views_.LeaveOutMasked(i, &missing);
-      if (RootMeanSquare(missing) < kNothing) continue;
+      if (start.empty() && RootMeanSquare(missing) < kNothing) continue;
       AddResidualRays(source_.field, camera, missing, most,
                       context_->settings.run.seed + static_cast<uint64_t>(i), &rays);
     }
     const ProgressFunction fitting = parts.Next(1);
     if (rays.num_rays() == 0) return std::vector<Vec3d>(static_cast<size_t>(graph_.voxels));
+    if (!start.empty()) {
+      const std::vector<Vec3d> seen = SumAlongRays(rays, start);
+      for (size_t r = 0; r < seen.size(); ++r) rays.missing[r] += seen[r].Cast<float>();
+    }
     return FitResidual(graph_, rays, options, std::move(start), fitting);
   }
 
@@ -123,21 +128,23 @@ VoxelResidual FitStyleResidual(RunContext* context, const WorkingViews& views,
   VoxelResidual residual{Floats(of_views), {}};
   if (choice.Layers().empty()) return residual;
 
-  const std::vector<Image> layers = LayersOf(choice, views);
+  const std::vector<RenderedEdit> edits = EditsOf(choice, views);
   std::vector<int> with_layer;
   for (int i = 0; i < views.count(); ++i)
-    if (!layers[static_cast<size_t>(i)].empty()) with_layer.push_back(i);
-  const auto layer = [&](int i) { return layers[static_cast<size_t>(i)]; };
+    if (!edits[static_cast<size_t>(i)].empty()) with_layer.push_back(i);
+  const auto edit_of = [&](int i) -> const RenderedEdit& {
+    return edits[static_cast<size_t>(i)];
+  };
   std::vector<Vec3d> all, edit;
   for (int turn = 0; turn < kScalings; ++turn) {
     options = ResidualOptions();
     if (turn > 0) options.turns = kTurnsAgain;
-    edit = fit.Fit(with_layer, residual, layer, options, std::move(edit), parts.Next(1));
+    edit = fit.Fit(with_layer, residual, edit_of, options, std::move(edit), parts.Next(1));
     all = edit;
     for (size_t v = 0; v < all.size(); ++v) all[v] += of_views[v];
     if (turn + 1 < kScalings) residual.view_scale = fit.ScaleOf(all);
+    residual.color = Floats(all);
   }
-  residual.color = Floats(all);
   return residual;
 }
 

@@ -16,9 +16,10 @@ namespace regrade {
 // As --residual asks for it. Cameras of `views` are in the field's frame. Targets are
 // made of renders, not of photos: the field's own errors are not the style's.
 //   views   what the 2D method makes of the unstyled renders of `indices`
-//   layers  that, and then, of the photos that have a layer, method(render) + layer, fitted to
-//           what is left, in turns with the scale, see EQ(view-scale); the cost of
-//           this part is higher, for it is seen from a few places
+//   layers  that, and then, of the photos that have a layer, method(render) with the edit (see
+//           RenderedEdit), fitted to what is left, in turns with the scale, see EQ(view-scale),
+//           and with what the renderer shows of the turn before; the cost of this part is
+//           higher, for it is seen from a few places
 VoxelResidual FitStyleResidual(RunContext* context, const WorkingViews& views,
                                const StoredField& source, const StoredNetwork& network,
                                const std::vector<int>& indices,

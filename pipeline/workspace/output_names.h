@@ -32,12 +32,15 @@ inline constexpr char kScenePage[] = "scene.html";
 // Films of camera paths that were made in a page.
 inline constexpr char kFilmsFolder[] = "films";
 
+// Retouched photos without what is left out of their edits.
+inline constexpr char kRetouchedFolder[] = "retouched";
+
 // What is at the top of the output folder and of a style's, besides `styles`: files and whole
 // folders of our own.
 inline constexpr const char* kOwnNames[] = {
     ".regrade",        "run.json",   "poses",        "field.npz",   "field_2d.npz",
     "network.npz",     "object.npz", "residual.npz", "styled.npz",  "views_2d",
-    "frames",          "heatmaps",   "stills",       "layers",      "retouched",
+    "frames",          "heatmaps",   "stills",       "layers",      kRetouchedFolder,
     "retouch",         "edit.cube",  "retouch.json", "report.json", "report.html",
     kScenePage,        kFilmsFolder, kStyledFilm,    kWipeFilm,     kViews2dFilm,
     "styles/.pictures"};

@@ -70,9 +70,26 @@ TEST(Assessment, WherePhotosAreMissingTheAdviceNamesThePlace) {
   EXPECT_NE(AssessmentOf(dense).advice.find("--preset standard"), std::string::npos);
 }
 
+TEST(Assessment, TheAdviceNamesTheNextPreset) {
+  RunReport soft = SoftDraft(29, 27.5);
+  const auto advice = [&](const std::string& preset) {
+    soft.preset = preset;
+    return AssessmentOf(soft).advice;
+  };
+  for (const auto& [preset, next] :
+       {std::pair{"smoke", "draft"}, {"draft", "standard"}, {"standard", "best"}})
+    EXPECT_NE(advice(preset).find(std::string("--preset ") + next), std::string::npos)
+        << advice(preset);
+  for (const char* finest : {"best", "paper"})
+    EXPECT_EQ(advice(finest).find("--preset"), std::string::npos) << advice(finest);
+  // Of a smoke run nothing else is to be mended.
+  soft.stages.reconstruct.reset();
+  EXPECT_NE(advice("smoke").find("--preset draft"), std::string::npos) << advice("smoke");
+}
+
 TEST(Assessment, SteadyIsTheFilms) {
   RunReport report;
-  report.stages.render = RenderReport{.path_frames = 60};
+  report.stages.render = RenderReport{.path_frames = 60, .film_frames = 120};
   report.evaluation.consistency = {Row("styled", 20), Row("views_2d", 25),
                                    Row("path_styled", 31), Row("path_views_2d", 30)};
   EXPECT_NE(AssessmentOf(report).sentences[1].find("1.0 dB steadier"), std::string::npos);
@@ -83,6 +100,10 @@ TEST(Assessment, SteadyIsTheFilms) {
   report.stages.render->path_frames = 60;
   report.evaluation.consistency.resize(2);
   EXPECT_EQ(AssessmentOf(report).sentences[1], "steady: not measured");
+  // With --no-films nothing is said of a film.
+  report.stages.render = RenderReport{};
+  EXPECT_EQ(AssessmentOf(report).sentences[1],
+            "steady: neighbouring views are 5.0 dB less steady than frame by frame");
 }
 
 }  // namespace

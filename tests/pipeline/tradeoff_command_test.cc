@@ -40,9 +40,11 @@ TEST(TradeoffCommand, MeasuresContinuesAndPredicts) {
     words.insert(words.end(), more.begin(), more.end());
     return Regrade(words);
   };
-  ProgramOutcome outcome = tradeoff({"--dry-run"});
+  ProgramOutcome outcome = tradeoff({"--dry-run", "--budget", "1e-9"});
   ASSERT_EQ(outcome.code, 0) << outcome.text;
   EXPECT_NE(outcome.text.find("flow: flow dis-ultrafast, about"), std::string::npos);
+  EXPECT_NE(outcome.text.find("the least useful --budget is about"), std::string::npos)
+      << outcome.text;
   EXPECT_FALSE(std::filesystem::exists(folder / "t"));
 
   // The base run counts: it spends this budget, and what budget is useful was said before it.
