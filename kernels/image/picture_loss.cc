@@ -85,6 +85,18 @@ void BlurDown(const Taps& taps, const float* rows, int64_t stride, int n, float*
   }
 }
 
+// Of n values, in lanes that the compiler may vectorise.
+float SumOf(const float* values, int n) {
+  constexpr int kLanes = 16;
+  float lanes[kLanes] = {}, sum = 0;
+  int i = 0;
+  for (; i + kLanes <= n; i += kLanes)
+    for (int l = 0; l < kLanes; ++l) lanes[l] += values[i + l];
+  for (; i < n; ++i) sum += values[i];
+  for (int l = 0; l < kLanes; ++l) sum += lanes[l];
+  return sum;
+}
+
 // A band's rows under the windows along x: kBand + 2 kSsimReach rows, 0 beyond the picture.
 struct BandRows {
   std::vector<float> values;
@@ -135,14 +147,15 @@ struct Comparison {
         hidden += 3;
         for (int c = 0; c < 3; ++c) to[3 * x + c] = seen[3 * x + c] = 0;
       }
-    float absolute = 0, squared = 0;
+    std::vector<float> differences(2 * static_cast<size_t>(n));
+    float *const absolute = differences.data(), *const squared = absolute + n;
     for (int i = 0; i < n; ++i) {
       const float difference = seen[i] - to[i];
-      absolute += std::abs(difference);
-      squared += difference * difference;
+      absolute[i] = std::abs(difference);
+      squared[i] = difference * difference;
       slope[i] = difference > 0 ? weight : difference < 0 ? -weight : 0.0f;
     }
-    of_row[static_cast<size_t>(y)] = {absolute, squared, 0, n - hidden};
+    of_row[static_cast<size_t>(y)] = {SumOf(absolute, n), SumOf(squared, n), 0, n - hidden};
   }
 
   void Slopes(int y0) {
@@ -165,23 +178,23 @@ struct Comparison {
       blur(x, own, r_xy.Row(r));
       blur(own, own, square.Row(r));
     });
-    std::vector<float> down(5 * static_cast<size_t>(n));
+    std::vector<float> down(6 * static_cast<size_t>(n));
     float* const of[5] = {down.data(), down.data() + n, down.data() + 2 * n,
                           down.data() + 3 * n, down.data() + 4 * n};
+    float* const similarity = down.data() + 5 * n;
     for (int y = y0; y < std::min(y0 + kBand, height); ++y) {
       BandRows* const bands[5] = {&p, &q, &r_xy, &m, &square};
       for (int k = 0; k < 5; ++k) bands[k]->Down(taps, y - y0, of[k]);
       float* const by[3] = {At(&rows->by_p, y), At(&rows->by_q, y), At(&rows->by_r, y)};
-      float similarity = 0;
       for (int i = 0; i < n; ++i) {
         const SsimSlopes<float> slopes =
             SsimOf(of[0][i], of[1][i], of[2][i], of[3][i], of[4][i]);
-        similarity += slopes.s;
+        similarity[i] = slopes.s;
         by[0][i] = slopes.by_p;
         by[1][i] = slopes.by_q;
         by[2][i] = slopes.by_r;
       }
-      of_row[static_cast<size_t>(y)].similarity = similarity;
+      of_row[static_cast<size_t>(y)].similarity = SumOf(similarity, n);
     }
   }
 

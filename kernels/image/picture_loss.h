@@ -35,7 +35,7 @@ struct SsimSlopes {
 };
 
 template <typename T>
-HD SsimSlopes<T> SsimOf(T p, T q, T r, T m_y, T square_y) {
+HD REGRADE_ALWAYS_INLINE SsimSlopes<T> SsimOf(T p, T q, T r, T m_y, T square_y) {
   const T a = 2 * p * m_y + T(kSsimC1), c = p * p + m_y * m_y + T(kSsimC1);
   const T b = 2 * (r - p * m_y) + T(kSsimC2);
   const T d = q - p * p + square_y - m_y * m_y + T(kSsimC2);

@@ -64,12 +64,13 @@ inline constexpr double kExtentMargin = 1e-5;  // relative
 
 template <typename T>
 HD PixelBox ExtentOf(const SplatCamera& camera, const ScreenEllipse<T>& ellipse, T reach) {
-  using std::hypot, std::sqrt;
+  using std::sqrt;
   const double radius = sqrt(static_cast<double>(reach)) * (1 + kExtentMargin) + kExtentMargin;
   PixelBox box;
   PixelsWithin(ellipse.u, radius * ellipse.c00, camera.width, &box.x0, &box.x1);
   const double c10 = ellipse.c10, c11 = ellipse.c11;
-  PixelsWithin(ellipse.v, radius * hypot(c10, c11), camera.height, &box.y0, &box.y1);
+  PixelsWithin(ellipse.v, radius * sqrt(c10 * c10 + c11 * c11), camera.height, &box.y0,
+               &box.y1);
   return box;
 }
 

@@ -1,5 +1,8 @@
 #include "kernels/splats/cpu/splat_frame.h"
 
+#include <omp.h>
+
+#include <algorithm>
 #include <array>
 #include <cstring>
 #include <utility>
@@ -19,15 +22,8 @@ struct Tiles {
         x1((box.x1 - 1) / kSplatTile + 1),
         y1((box.y1 - 1) / kSplatTile + 1) {}
   int64_t count() const { return int64_t{x1 - x0} * (y1 - y0); }
+  int64_t PlaceOf(int x, int y) const { return int64_t{y - y0} * (x1 - x0) + (x - x0); }
 };
-
-// Calls add(tile) for the tiles of a box, in their order.
-template <typename Add>
-void ForTiles(const SplatFrame& frame, const PixelBox& box, const Add& add) {
-  const Tiles tiles(box);
-  for (int y = tiles.y0; y < tiles.y1; ++y)
-    for (int x = tiles.x0; x < tiles.x1; ++x) add(static_cast<size_t>(y * frame.tiles_x + x));
-}
 
 // Fills seen and box, and the numbers of tiles in first_slot [1 .. splats].
 void SeeAll(SplatFrame* frame) {
@@ -45,6 +41,21 @@ void SeeAll(SplatFrame* frame) {
     frame->box[at] = box;
     frame->first_slot[at + 1] = box.empty() ? 0 : Tiles(box).count();
   }
+}
+
+// Sums up first_slot, and counts the entries of tiles in first_entry.
+void CountEntries(SplatFrame* frame) {
+  frame->first_entry.assign(static_cast<size_t>(frame->num_tiles()) + 1, 0);
+  for (size_t i = 0; i < frame->box.size(); ++i) {
+    frame->first_slot[i + 1] += frame->first_slot[i];
+    if (frame->box[i].empty()) continue;
+    const Tiles tiles(frame->box[i]);
+    for (int y = tiles.y0; y < tiles.y1; ++y)
+      for (int x = tiles.x0; x < tiles.x1; ++x)
+        ++frame->first_entry[static_cast<size_t>(y * frame->tiles_x + x) + 1];
+  }
+  for (size_t tile = 0; tile + 1 < frame->first_entry.size(); ++tile)
+    frame->first_entry[tile + 1] += frame->first_entry[tile];
 }
 
 struct DepthKey {
@@ -92,25 +103,33 @@ void MakeSplatFrame(const SplatsView<float>& splats, const Camera& camera,
   frame->tiles_x = (camera.width + kSplatTile - 1) / kSplatTile;
   frame->tiles_y = (camera.height + kSplatTile - 1) / kSplatTile;
   SeeAll(frame);
-  frame->first_entry.assign(static_cast<size_t>(frame->num_tiles()) + 1, 0);
-  for (size_t i = 0; i < frame->box.size(); ++i) {
-    frame->first_slot[i + 1] += frame->first_slot[i];
-    if (frame->box[i].empty()) continue;
-    ForTiles(*frame, frame->box[i], [&](size_t tile) { ++frame->first_entry[tile + 1]; });
+  std::vector<DepthKey> keys;
+#pragma omp parallel sections
+  {
+#pragma omp section
+    keys = ByDepth(*frame);
+#pragma omp section
+    CountEntries(frame);
   }
-  for (size_t tile = 0; tile + 1 < frame->first_entry.size(); ++tile)
-    frame->first_entry[tile + 1] += frame->first_entry[tile];
   std::vector<int64_t> next(frame->first_entry.begin(), frame->first_entry.end() - 1);
   frame->entry_splat.resize(static_cast<size_t>(frame->first_slot.back()));
   frame->entry_slot.resize(frame->entry_splat.size());
-  for (const DepthKey& key : ByDepth(*frame)) {
-    const size_t i = static_cast<size_t>(key.splat);
-    int64_t slot = frame->first_slot[i];
-    ForTiles(*frame, frame->box[i], [&](size_t tile) {
-      const size_t entry = static_cast<size_t>(next[tile]++);
-      frame->entry_splat[entry] = key.splat;
-      frame->entry_slot[entry] = slot++;
-    });
+  // Every band of rows of tiles sees all splats in their order.
+  const int bands = std::min(frame->tiles_y, omp_get_max_threads());
+#pragma omp parallel for schedule(static, 1)
+  for (int band = 0; band < bands; ++band) {
+    const int first = frame->tiles_y * band / bands, end = frame->tiles_y * (band + 1) / bands;
+    for (const DepthKey& key : keys) {
+      const size_t i = static_cast<size_t>(key.splat);
+      const Tiles tiles(frame->box[i]);
+      for (int y = std::max(first, tiles.y0); y < std::min(end, tiles.y1); ++y)
+        for (int x = tiles.x0; x < tiles.x1; ++x) {
+          const size_t entry =
+              static_cast<size_t>(next[static_cast<size_t>(y * frame->tiles_x + x)]++);
+          frame->entry_splat[entry] = key.splat;
+          frame->entry_slot[entry] = frame->first_slot[i] + tiles.PlaceOf(x, y);
+        }
+    }
   }
 }
 
