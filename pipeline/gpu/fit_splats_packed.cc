@@ -19,12 +19,13 @@ namespace {
 
 struct HeldOutMeans {
   double psnr = 0, ssim = 0;
-  int count = 0;
+  int count = 0;  // of views with an unmasked pixel
 };
 
 HeldOutMeans Measure(SplatEngine* engine, const PackedCapture& capture,
                      const std::string& frames) {
   HeldOutMeans means;
+  int index = 0;
   if (!frames.empty()) std::filesystem::create_directories(frames);
   for (const PackedView& view : capture.views) {
     if (!view.held_out) continue;
@@ -32,9 +33,11 @@ HeldOutMeans Measure(SplatEngine* engine, const PackedCapture& capture,
     Camera camera = view.camera.Undistorted();
     camera.ndc = {};
     const Image seen = engine->Render(camera).color;
-    if (!frames.empty()) WritePpm(Concat(frames, "/frame_", means.count, ".ppm"), seen);
-    means.psnr += Psnr(seen, photo).value_or(0);
-    means.ssim += Ssim(seen, photo).value_or(0);
+    if (!frames.empty()) WritePpm(Concat(frames, "/frame_", index++, ".ppm"), seen);
+    const auto psnr = Psnr(seen, photo), ssim = Ssim(seen, photo);
+    if (!psnr || !ssim) continue;
+    means.psnr += *psnr;
+    means.ssim += *ssim;
     ++means.count;
   }
   means.psnr /= std::max(means.count, 1);

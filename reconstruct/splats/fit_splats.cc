@@ -60,8 +60,6 @@ class SplatFitter {
     ChoosePhotos();
     while (step_ < options_.steps) {
       Step();
-      if (hooks_.measure_each > 0 && step_ % hooks_.measure_each == 0 && step_ < options_.steps)
-        Measure();
       if (Report(hooks_.progress, step_, options_.steps, note_) == LoopControl::kStop) {
         SaveCheckpoint();
         throw Interrupted();

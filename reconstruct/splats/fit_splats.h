@@ -51,10 +51,8 @@ class SplatEngine;
 
 struct SplatFitHooks {
   ProgressFunction progress;
-  // Called at the end, and at `measure_each` steps if that is not 0.
-  std::function<void(SplatEngine*)> measure;
-  int measure_each = 0;
-  SplatFitState* resume = nullptr;  // moved from
+  std::function<void(SplatEngine*)> measure;  // called at the end
+  SplatFitState* resume = nullptr;            // moved from
   std::function<void(const SplatFitState&)> checkpoint;
 };
 

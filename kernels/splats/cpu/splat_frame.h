@@ -1,4 +1,4 @@
-// The splats that a camera sees, in order, and which tiles of the picture each of them meets.
+// The splats that a camera sees, and those of each tile of the picture, front to back.
 #pragma once
 
 #include <cstdint>
