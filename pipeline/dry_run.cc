@@ -16,7 +16,6 @@
 #include "pipeline/run/plan.h"
 #include "pipeline/stages/stages.h"
 #include "pipeline/workspace/folder_size.h"
-#include "reconstruct/fit/adapt_options.h"
 
 namespace regrade {
 namespace {
@@ -119,10 +118,13 @@ void PlanNewScene(const std::string& last, RunContext* context) {
   PlanStages("pose", last, "", context);
   if (last == "pose") return;
   const Backend backend = ChooseBackend(settings.run.device, settings.run.reproducible);
-  const int64_t pixels = PixelsToFit(settings, SizeOfSource(context));
-  const std::string warning = MemoryWarning(
-      AdaptOptions(settings.fit, {.on_card = backend == Backend::kCuda, .pixels = pixels}),
-      {backend, pixels, SceneBox(), settings.run.max_memory_gb, settings.run.reproducible});
+  const CaptureSize size = SizeOfSource(context);
+  const std::string warning =
+      MemoryWarning(settings, {.backend = backend,
+                               .pixels = PixelsToFit(settings, size),
+                               .photos = PhotosToFit(settings, size),
+                               .max_memory_gb = settings.run.max_memory_gb,
+                               .reproducible = settings.run.reproducible});
   if (!warning.empty()) context->console->Warn(warning);
 }
 

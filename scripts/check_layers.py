@@ -43,6 +43,7 @@ LAYERS = {
     "kernels/splats": 3,
     "kernels/splats/cpu": 4,
     "kernels/splats/cuda": 4,
+    "kernels/render": 5,
     "reconstruct/scene": 0,
     "reconstruct/colmap": 1,
     "reconstruct/fit": 1,

@@ -4,6 +4,8 @@
 #include <memory>
 #include <vector>
 
+#include "kernels/base/error.h"
+
 namespace regrade {
 
 FastSpheres MakeFastSpheres(const RadianceField& field) {
@@ -33,6 +35,7 @@ void ToSphereGeometry(const FastSpheres& spheres, SphereGeometry* geometry,
 }
 
 FastGrid MakeFastGrid(const RadianceField& field) {
+  REGRADE_CHECK(!field.geometry->splats.on());
   FastGrid grid;
   const Geometry& geometry = *field.geometry;
   grid.frame = geometry.frame;

@@ -21,9 +21,9 @@ int64_t CountNonFinite(const Buffer<float>& values) {
   return count;
 }
 
-void CheckFrame(const GridFrame& frame, const char* name) {
+void CheckFrame(const GridFrame& frame, bool voxels, const char* name) {
   for (int a = 0; a < 3; ++a) {
-    if (frame.resolution[a] < 2)
+    if (voxels && frame.resolution[a] < 2)
       Refuse(name, "the grid has " + std::to_string(frame.resolution[a]) +
                        " vertices along an axis, at least 2 are needed");
     if (!(frame.radius[a] > 0) || !std::isfinite(frame.radius[a]) ||
@@ -47,6 +47,19 @@ void CheckCells(const Geometry& geometry, const char* name) {
       Refuse(name, "cell " + std::to_string(i / 8) + " has vertex " +
                        std::to_string(cells.corner[i]) + " of " +
                        std::to_string(cells.num_vertices()));
+}
+
+void CheckSplats(const Geometry& geometry, const char* name) {
+  const SplatGeometry& splats = geometry.splats;
+  const int64_t n = splats.opacity_logit.size();
+  if (n > INT32_MAX) Refuse(name, Concat(n, " splats, at most ", INT32_MAX, " are supported"));
+  if (splats.mean.size() != 3 * n || splats.log_scale.size() != 3 * n ||
+      splats.quaternion.size() != 4 * n || geometry.density.size() > 0 ||
+      geometry.links.size() > 0 || geometry.cells.on() || geometry.spheres.on())
+    Refuse(name, "the sizes of the splats' arrays disagree");
+  const int64_t bad = CountNonFinite(splats.mean) + CountNonFinite(splats.log_scale) +
+                      CountNonFinite(splats.quaternion) + CountNonFinite(splats.opacity_logit);
+  if (bad > 0) Refuse(name, Concat(bad, " values of splats are not finite"));
 }
 
 // One pass: a link out of range would be an access out of bounds, and a voxel shared by two
@@ -98,8 +111,10 @@ void CheckSpheres(const Geometry& geometry, const Buffer<float>& color, const ch
 void Validate(const RadianceField& field, const char* name) {
   if (field.geometry == nullptr) Refuse(name, "the grid is missing");
   const Geometry& geometry = *field.geometry;
-  CheckFrame(geometry.frame, name);
-  if (geometry.cells.on())
+  CheckFrame(geometry.frame, !geometry.splats.on(), name);
+  if (geometry.splats.on())
+    CheckSplats(geometry, name);
+  else if (geometry.cells.on())
     CheckCells(geometry, name);
   else if (geometry.links.size() != geometry.frame.NumVertices())
     Refuse(name, std::to_string(geometry.links.size()) + " links for a grid of " +

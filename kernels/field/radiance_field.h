@@ -1,5 +1,6 @@
-// A Plenoxel field: a sparse voxel grid of densities (Geometry, frozen once fitted) and
-// spherical harmonics (Appearance, which a style changes).
+// A radiance field: a Geometry, frozen once fitted, and spherical harmonics (Appearance, which
+// a style changes). The geometry is a sparse voxel grid of densities, as of Plenoxels, or
+// Gaussian splats.
 #pragma once
 
 #include <cstdint>
@@ -28,16 +29,31 @@ struct SphereGeometry {
   int64_t num_columns() const { return on() ? density.size() / layers : 0; }
 };
 
-// A uniform grid has links, one per vertex of the frame; an adaptive field has cells, and its
-// voxels are their vertices.
+// Splats in place of voxels: all of them but their colours, in the units of Splat
+// (kernels/splats/splats.h).
+struct SplatGeometry {
+  Buffer<float> mean, log_scale;  // [N, 3]
+  Buffer<float> quaternion;       // [N, 4]
+  Buffer<float> opacity_logit;    // [N]
+  bool antialiased = false;       // see SplatOptions
+
+  bool on() const { return opacity_logit.size() > 0; }
+};
+
+// Records are what has a colour: voxels or splats. A uniform grid has links, one per vertex of
+// the frame; an adaptive field has cells, and its voxels are their vertices; of splats the
+// frame is the box that the cameras look at, without voxels, and some lie outside of it.
 struct Geometry {
   GridFrame frame;
   Buffer<int32_t> links;  // [X, Y, Z]: voxel index, or -1 where nothing is stored
   CellGrid cells;  // see cell_lattice.h; the frame's resolution is that of the finest level
   Buffer<float> density;  // [N]: per world unit of length; negative means empty (ReLU)
   SphereGeometry spheres;
+  SplatGeometry splats;
 
-  int64_t num_voxels() const { return density.size(); }
+  int64_t num_voxels() const {  // records
+    return splats.on() ? splats.opacity_logit.size() : density.size();
+  }
 };
 
 struct Appearance {
@@ -54,7 +70,7 @@ struct RadianceField {
   Appearance appearance;
   Vec3f background{0, 0, 0};  // sRGB, visible where transmittance remains
   float near_clip = 0;        // world units along the ray, for rendering and fitting
-  float step = 0.5f;          // voxels between samples of a ray, for rendering and fitting
+  float step = 0.5f;          // voxels between samples of a ray; splats have none
 };
 
 // Throws Error(kInput) naming the defect: inconsistent sizes, a link out of range (F68),

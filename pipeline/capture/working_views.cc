@@ -9,6 +9,7 @@
 
 #include "kernels/base/error.h"
 #include "kernels/image/resize.h"
+#include "kernels/image/undistort_photo.h"
 #include "pipeline/capture/capture_store.h"
 #include "pipeline/capture/photo_masks.h"
 #include "pipeline/images/image_file.h"
@@ -29,6 +30,12 @@ Image AtWorkingSize(Image image, int longest_side) {
   WorkingSize(image.width, image.height, longest_side, &width, &height);
   if (width == image.width && height == image.height) return image;
   return Resize(image, width, height);
+}
+
+Image Filled(int width, int height, float value) {
+  Image image(width, height, 1);
+  std::ranges::fill(image.pixels, value);
+  return image;
 }
 
 }  // namespace
@@ -57,6 +64,17 @@ WorkingViews WorkingViews::InField(const Similarity& field_from_world,
   return views;
 }
 
+WorkingViews WorkingViews::Pinholes() const {
+  WorkingViews views = *this;
+  views.pinholes_ = true;
+  return views;
+}
+
+WorkingViews WorkingViews::InField(const StoredField& stored) const {
+  const WorkingViews views = InField(stored.field_from_world, stored.ndc);
+  return stored.field.geometry->splats.on() ? views.Pinholes() : views;
+}
+
 WorkingViews WorkingViews::WithGains(PhotoGains gains) const {
   WorkingViews views = *this;
   views.gains_ = std::move(gains);
@@ -77,8 +95,12 @@ std::vector<int> WorkingViews::Indices(bool held_out) const {
   return indices;
 }
 
-Camera WorkingViews::CameraOf(int i) const {
+Camera WorkingViews::LensOf(int i) const {
   return WorkingCamera(View(i).camera, photo_size_, field_from_world_, ndc_);
+}
+
+Camera WorkingViews::CameraOf(int i) const {
+  return pinholes_ ? LensOf(i).Undistorted() : LensOf(i);
 }
 
 std::vector<Camera> WorkingViews::Cameras() const {
@@ -96,14 +118,23 @@ Image WorkingViews::Photo(int i) const {
                      view.path, "the staged photo was changed: use --restart-from pose");
   if (photo.channels != 3) throw InputError("not an RGB picture", view.path);
   photo = AtWorkingSize(std::move(photo), photo_size_);
+  if (IsUndistorted(i)) {
+    photo = UndistortPhoto(photo, LensOf(i));
+    for (float& value : photo.pixels)
+      if (!std::isfinite(value)) value = 0;
+  }
   UndoGain(gains_.Of(i), &photo);
   return photo;
 }
 
 Image WorkingViews::Mask(int i) const {
   const std::string path = StagedMaskOf(View(i).path);
-  if (!std::filesystem::is_regular_file(path)) return {};
-  const Image mask = AtWorkingSize(ReadImage(path), photo_size_);
+  const bool masked = std::filesystem::is_regular_file(path);
+  if (!masked && !IsUndistorted(i)) return {};
+  const Camera lens = LensOf(i);
+  Image mask =
+      masked ? AtWorkingSize(ReadImage(path), photo_size_) : Filled(lens.width, lens.height, 1);
+  if (IsUndistorted(i)) mask = UndistortPhoto(mask, lens);  // NaN beyond the photo
   Image kept(mask.width, mask.height, 1);
   constexpr float kWhole = 1 - 1e-4f;  // and rounding
   for (int64_t p = 0; p < kept.num_pixels(); ++p)

@@ -8,6 +8,7 @@
 
 #include "kernels/scene/capture.h"
 #include "pipeline/capture/photo_gains.h"
+#include "pipeline/fields/field_file.h"
 
 namespace regrade {
 
@@ -29,6 +30,10 @@ class WorkingViews {
   WorkingViews(Capture capture, int photo_size, int holdout);
 
   WorkingViews InField(const Similarity& field_from_world, const NdcSpace& ndc) const;
+  // As `stored` needs its cameras: of splats they are pinholes.
+  WorkingViews InField(const StoredField& stored) const;
+  // Photos are undistorted, and what they do not show is masked.
+  WorkingViews Pinholes() const;
   WorkingViews WithGains(PhotoGains gains) const;
   WorkingViews AsTaken() const { return WithGains({}); }
   WorkingViews AtSize(int photo_size) const;
@@ -48,8 +53,8 @@ class WorkingViews {
 
   // The photo at the size of its camera, 3 channels, its gain undone. Throws Error(kInput).
   Image Photo(int i) const;
-  // [H, W, 1]: 1 where no part of a pixel is masked (--photo-masks), else 0. Empty (0 x 0)
-  // where the photo has no mask.
+  // [H, W, 1]: 1 where no part of a pixel is masked (--photo-masks) or beyond an undistorted
+  // photo, else 0. Empty (0 x 0) where the photo has no mask.
   Image Mask(int i) const;
   // Sets masked pixels of a picture of that size to NaN: they are neither fitted nor measured.
   void LeaveOutMasked(int i, Image* picture) const;
@@ -58,12 +63,16 @@ class WorkingViews {
 
  private:
   std::vector<int> Indices(bool held_out) const;
+  // Of photo i as it was taken, before it is undistorted.
+  Camera LensOf(int i) const;
+  bool IsUndistorted(int i) const { return pinholes_ && LensOf(i).lens != LensModel::kPinhole; }
 
   std::shared_ptr<const Capture> capture_;
   int photo_size_, holdout_;
   PhotoGains gains_;
   Similarity field_from_world_;
   NdcSpace ndc_;
+  bool pinholes_ = false;
 };
 
 // Of a folder poses/ with the gains that are stored there (ReadGains), cameras in the capture's

@@ -10,6 +10,7 @@
 #include "kernels/field/cpu/render_view.h"
 #include "kernels/field/packed_grid.h"
 #include "kernels/field/pad_sh_basis.h"
+#include "kernels/render/field_renderer.h"
 #include "pipeline/capture/working_views.h"
 #include "pipeline/commands/command.h"
 #include "pipeline/commands/probe_styles.h"
@@ -81,7 +82,7 @@ Scene ReadScene(const Workspace& workspace, const SheetOptions& sheet,
   // As Restyle does it, for the linear map.
   scene.stored.field.appearance =
       PadShBasis(std::move(scene.stored.field.appearance), kStyledBasis);
-  scene.views = scene.views.InField(scene.stored.field_from_world, scene.stored.ndc);
+  scene.views = scene.views.InField(scene.stored);
   scene.training_views = scene.views.Training();
   if (scene.training_views.empty()) scene.training_views = scene.views.HeldOut();
   const int count = std::min(sheet.views, static_cast<int>(scene.training_views.size()));
@@ -103,11 +104,10 @@ Scene ReadScene(const Workspace& workspace, const SheetOptions& sheet,
 
 // Renders of the shown views, clipped as pictures are.
 std::vector<Image> Shown(const Scene& scene, const RadianceField& field) {
-  const FastGrid grid = MakeFastGrid(field);
+  const FieldRenderer renderer(field, Backend::kCpu);
   std::vector<Image> frames;
   for (const int i : scene.shown)
-    frames.push_back(
-        Clipped(RenderView(grid, scene.cameras[i], MarchOptions{field.step}).color));
+    frames.push_back(Clipped(renderer.Render(scene.cameras[i]).color));
   return frames;
 }
 
@@ -121,14 +121,16 @@ StyledPhotos StylePhotos(const Scene& scene, ViewStylizer* stylizer, const std::
   const RadianceField& field = scene.stored.field;
   StyledPhotos styled{{field, scene.object.get(), &scene.weights}, {}};
   styled.pictures.resize(scene.photos.size());
+  std::optional<FieldRenderer> renderer;  // where a photo has a mask
   for (const int i : scene.training_views) {
     const size_t n = static_cast<size_t>(i);
     if (!stylizer->Knows(i) || (scene.object != nullptr && !scene.object->Knows(i))) continue;
     const auto target = [&] {
       Image photo = scene.photos[n];
-      if (!scene.kept[n].empty())
-        FillMasked(scene.kept[n],
-                   RenderView(field, scene.cameras[n], MarchOptions{field.step}).color, &photo);
+      if (!scene.kept[n].empty()) {
+        if (!renderer) renderer.emplace(field, Backend::kCpu);
+        FillMasked(scene.kept[n], renderer->Render(scene.cameras[n]).color, &photo);
+      }
       return styled.pictures[n] = Clipped(stylizer->Stylize(photo, i));
     };
     styled.targets.Add({i, scene.cameras[n],

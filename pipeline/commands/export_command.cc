@@ -9,6 +9,7 @@
 #include "kernels/base/error.h"
 #include "kernels/field/cpu/render_view.h"
 #include "kernels/field/packed_grid.h"
+#include "kernels/render/field_renderer.h"
 #include "pipeline/capture/transforms_json.h"
 #include "pipeline/capture/working_views.h"
 #include "pipeline/commands/command.h"
@@ -110,8 +111,7 @@ constexpr int kComparedViews = 3;
 // Some views, evenly spaced, in a field's frame.
 std::vector<Camera> ViewsOf(const std::string& folder, const StoredField& stored, int most) {
   constexpr int kSize = 400;  // pixels of the longer side
-  const WorkingViews views = ReadWorkingViews(folder + "/poses", kSize, 0)
-                                 .InField(stored.field_from_world, stored.ndc);
+  const WorkingViews views = ReadWorkingViews(folder + "/poses", kSize, 0).InField(stored);
   const int count = std::min(most, views.count());
   std::vector<Camera> cameras;
   for (int i = 0; i < count; ++i) cameras.push_back(views.CameraOf(views.count() * i / count));
@@ -119,10 +119,9 @@ std::vector<Camera> ViewsOf(const std::string& folder, const StoredField& stored
 }
 
 std::vector<Image> Renders(const RadianceField& field, const std::vector<Camera>& cameras) {
-  const FastGrid grid = MakeFastGrid(field);
+  const FieldRenderer renderer(field, Backend::kCpu);
   std::vector<Image> renders;
-  for (const Camera& camera : cameras)
-    renders.push_back(RenderView(grid, camera, MarchOptions{field.step}).color);
+  for (const Camera& camera : cameras) renders.push_back(renderer.Render(camera).color);
   return renders;
 }
 

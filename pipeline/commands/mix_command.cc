@@ -5,11 +5,11 @@
 #include <optional>
 
 #include "kernels/base/error.h"
+#include "kernels/render/field_renderer.h"
 #include "pipeline/capture/working_views.h"
 #include "pipeline/commands/command.h"
 #include "pipeline/commands/mix_keys.h"
 #include "pipeline/fields/field_file.h"
-#include "pipeline/fields/field_renderer.h"
 #include "pipeline/files/json_file.h"
 #include "pipeline/files/text.h"
 #include "pipeline/images/image_file.h"
@@ -81,8 +81,8 @@ struct MixCameras {
 
 MixCameras CamerasOf(const std::string& folder, const StoredField& stored,
                      const SceneOptions& scene, const RenderOptions& render) {
-  const WorkingViews views = ReadWorkingViews(folder + "/poses", scene.photo_size, 0)
-                                 .InField(stored.field_from_world, stored.ndc);
+  const WorkingViews views =
+      ReadWorkingViews(folder + "/poses", scene.photo_size, 0).InField(stored);
   const std::vector<Camera> film = MakeFilmPath(views, render, &stored.field).film;
   return {render.path.path == "views" ? views.Cameras() : film, film};
 }

@@ -3,9 +3,9 @@
 #include <filesystem>
 
 #include "kernels/base/error.h"
+#include "kernels/render/field_renderer.h"
 #include "pipeline/capture/working_views.h"
 #include "pipeline/commands/continue_command.h"
-#include "pipeline/fields/field_renderer.h"
 #include "pipeline/files/text.h"
 #include "pipeline/images/still_file.h"
 #include "pipeline/program/device_choice.h"
@@ -90,7 +90,7 @@ void RenderStills(const std::string& folder, const std::string& name,
   const StoredField stored = ReadStyledField(folder, style.folder(), settings.style.strength);
   const WorkingViews views =
       ReadWorkingViews(scene.Path("poses"), options.size > 0 ? options.size : kLongest, 0)
-          .InField(stored.field_from_world, stored.ndc);
+          .InField(stored);
   const Vignette vignette = ParseVignette(settings.render.vignette);
   std::vector<int> wanted;
   for (const std::string& still : options.still)

@@ -4,11 +4,11 @@
 
 #include "kernels/base/error.h"
 #include "kernels/image/resize.h"
+#include "kernels/render/field_renderer.h"
 #include "pipeline/capture/photo_names.h"
 #include "pipeline/commands/command.h"
 #include "pipeline/dry_run.h"
 #include "pipeline/fields/field_file.h"
-#include "pipeline/fields/field_renderer.h"
 #include "pipeline/files/atomic_file.h"
 #include "pipeline/files/json_file.h"
 #include "pipeline/files/text.h"
@@ -103,8 +103,8 @@ void WriteRender(const std::string& path, int view, RunContext* context) {
   const StoredField stored = ReadFieldFile(field);
   const Backend backend = ChooseBackend(settings.run.device, settings.run.reproducible);
   constexpr int kLongest = 1 << 16;
-  const WorkingViews views = ReadWorkingViews(context->workspace->Path("poses"), kLongest, 0)
-                                 .InField(stored.field_from_world, stored.ndc);
+  const WorkingViews views =
+      ReadWorkingViews(context->workspace->Path("poses"), kLongest, 0).InField(stored);
   WriteStill(path, FieldRenderer(stored.field, backend).Render(views.CameraOf(view)).color);
   context->console->Info("wrote " + path + ": edit it, and give the edit with --edited");
 }

@@ -13,8 +13,9 @@
 namespace regrade {
 namespace {
 
-// An adaptive field's arrays are unknown to readers of version 1.
-constexpr int32_t kUniformVersion = 1, kCellsVersion = 2;
+// The arrays of an adaptive field are unknown to readers of version 1, those of splats to
+// readers of version 2.
+constexpr int32_t kUniformVersion = 1, kCellsVersion = 2, kSplatsVersion = 3;
 constexpr int kStoredBasis = 9;
 constexpr int64_t kSphericalHarmonics = 1;  // svox2's basis_type
 
@@ -64,7 +65,7 @@ Vec3f ReadVec3(NpzReader* file, const std::string& name) {
 }
 
 void CheckReadable(NpzReader* file) {
-  RefuseNewerFormat(file, kCellsVersion);
+  RefuseNewerFormat(file, kSplatsVersion);
   if (file->Has("basis_type")) {
     const NpzArray type = file->Read("basis_type");
     const bool wide = type.type == ArrayType::kI64, narrow = type.type == ArrayType::kI32;
@@ -140,10 +141,59 @@ void ReadCells(NpzReader* file, Geometry* geometry) {
   BuildTree(geometry->frame.resolution, &cells);
 }
 
+// The arrays of splats in half precision, which WriteTo reads.
+struct StoredSplats {
+  std::vector<uint16_t> log_scale, quaternion, opacity_logit;
+};
+
+std::vector<uint16_t> Halves(const Buffer<float>& values) {
+  std::vector<uint16_t> halves(static_cast<size_t>(values.size()));
+  std::ranges::transform(values, halves.begin(), StoredColour);
+  return halves;
+}
+
+void AddSplats(const SplatGeometry& splats, StoredSplats* stored, NpzWriter* file) {
+  const int64_t n = splats.opacity_logit.size();
+  stored->log_scale = Halves(splats.log_scale);
+  stored->quaternion = Halves(splats.quaternion);
+  stored->opacity_logit = Halves(splats.opacity_logit);
+  file->Add("regrade_splats_mean", {n, 3}, splats.mean.data());
+  file->Add("regrade_splats_log_scale", {n, 3}, stored->log_scale.data());
+  file->Add("regrade_splats_quaternion", {n, 4}, stored->quaternion.data());
+  file->Add("regrade_splats_opacity_logit", {n}, stored->opacity_logit.data());
+  file->AddScalar<int32_t>("regrade_splats_antialiased", splats.antialiased);
+}
+
+Buffer<float> ReadHalves(NpzReader* file, const std::string& name,
+                         const std::vector<int64_t>& shape) {
+  const NpzArray array = file->Read(name, ArrayType::kF16, shape);
+  Buffer<float> values(array.num_elements());
+  for (int64_t i = 0; i < values.size(); ++i) values[i] = ValueAt(array, i);
+  return values;
+}
+
+void ReadSplats(NpzReader* file, SplatGeometry* splats) {
+  const NpzArray mean = file->Read("regrade_splats_mean", ArrayType::kF32, {-1, 3});
+  const int64_t n = mean.shape[0];
+  if (n == 0) Refuse(file->path(), "there are no splats");
+  splats->mean.Resize(3 * n);
+  std::copy_n(mean.As<float>(), 3 * n, splats->mean.data());
+  splats->log_scale = ReadHalves(file, "regrade_splats_log_scale", {n, 3});
+  splats->quaternion = ReadHalves(file, "regrade_splats_quaternion", {n, 4});
+  splats->opacity_logit = ReadHalves(file, "regrade_splats_opacity_logit", {n});
+  splats->antialiased = file->ReadScalar<int32_t>("regrade_splats_antialiased") != 0;
+}
+
 Geometry ReadGeometry(NpzReader* file) {
   Geometry geometry;
   geometry.frame.radius = ReadVec3(file, "radius");
   geometry.frame.center = ReadVec3(file, "center");
+  if (file->Has("regrade_splats_mean")) {
+    if (file->Has("links") || file->Has("regrade_cells_key"))
+      Refuse(file->path(), "a field has voxels or splats, not both");
+    ReadSplats(file, &geometry.splats);
+    return geometry;
+  }
   if (file->Has("regrade_cells_key")) {
     if (file->Has("links"))
       Refuse(file->path() + ": array 'links'", "a field has links or cells, not both");
@@ -180,6 +230,9 @@ void ReadValues(NpzReader* file, Geometry* geometry, Appearance* appearance) {
     Refuse(file->path() + ": array '" + (joined ? "data" : "sh_data") + "'",
            std::to_string(colours.shape[0]) + " rows, but the cells have " +
                std::to_string(geometry->cells.num_vertices()) + " vertices");
+  if (geometry->splats.on() && colours.shape[0] != geometry->num_voxels())
+    Refuse(file->path() + ": array 'sh_data'", Concat(colours.shape[0], " rows, but there are ",
+                                                      geometry->num_voxels(), " splats"));
   const int stored = static_cast<int>((colours.shape[1] - first) / 3);
   appearance->basis =
       file->Has("regrade_basis") ? file->ReadScalar<int32_t>("regrade_basis") : stored;
@@ -188,6 +241,7 @@ void ReadValues(NpzReader* file, Geometry* geometry, Appearance* appearance) {
     Refuse(file->path(),
            Concat("regrade_basis is ", basis, " of ", stored, " stored harmonics"));
   appearance->sh = UnpackedColours(colours, first, stored, basis);
+  if (geometry->splats.on()) return;
   geometry->density.Resize(colours.shape[0]);
   if (joined) {
     for (int64_t i = 0; i < colours.shape[0]; ++i)
@@ -216,7 +270,10 @@ void WriteFieldFile(const std::string& path, const StoredField& stored) {
   file.Add("radius", {3}, &geometry.frame.radius.x);
   file.Add("center", {3}, &geometry.frame.center.x);
   const CellGrid& cells = geometry.cells;
-  if (cells.on()) {
+  StoredSplats splats;  // read by the writer in WriteTo
+  if (geometry.splats.on()) {
+    AddSplats(geometry.splats, &splats, &file);
+  } else if (cells.on()) {
     file.Add("regrade_cells_size", {3}, &size.x);
     file.AddScalar<int32_t>("regrade_cells_finest", cells.finest);
     file.Add("regrade_cells_key", {cells.num_cells()}, cells.key.data(), NpzPacking::kDeflate);
@@ -225,7 +282,7 @@ void WriteFieldFile(const std::string& path, const StoredField& stored) {
   } else {
     file.Add("links", {size.x, size.y, size.z}, geometry.links.data(), NpzPacking::kDeflate);
   }
-  file.Add("density_data", {voxels, 1}, geometry.density.data());
+  if (!geometry.splats.on()) file.Add("density_data", {voxels, 1}, geometry.density.data());
   file.AddFilled<uint16_t>(
       "sh_data", {voxels, 3 * kStoredBasis},
       [&field](int64_t first, int64_t count, uint16_t* to) {
@@ -233,7 +290,9 @@ void WriteFieldFile(const std::string& path, const StoredField& stored) {
       },
       field.appearance.basis == kStoredBasis ? NpzPacking::kStore : NpzPacking::kDeflate);
   file.AddScalar<int64_t>("basis_type", kSphericalHarmonics);
-  file.AddScalar<int32_t>("regrade_version", cells.on() ? kCellsVersion : kUniformVersion);
+  file.AddScalar<int32_t>("regrade_version", geometry.splats.on() ? kSplatsVersion
+                                             : cells.on()         ? kCellsVersion
+                                                                  : kUniformVersion);
   file.AddScalar<int32_t>("regrade_basis", field.appearance.basis);
   file.Add("regrade_background", {3}, &field.background.x);
   file.AddScalar<float>("regrade_near_clip", field.near_clip);

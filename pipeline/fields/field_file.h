@@ -15,6 +15,11 @@
 // order of their keys). Rows of density_data and sh_data are the cells' corners in the order of
 // their keys, each place once. svox2 does not read such a file; `regrade export --format svox2`
 // makes one that it reads.
+//
+// A field of splats has neither links nor cells nor density_data: in their place are
+// regrade_splats_mean f32[N,3], regrade_splats_log_scale f16[N,3], regrade_splats_quaternion
+// f16[N,4] (unit length), regrade_splats_opacity_logit f16[N] and regrade_splats_antialiased
+// i32, see SplatGeometry; radius and center are those of the box that the cameras look at.
 #pragma once
 
 #include <cstdint>
@@ -33,9 +38,10 @@ struct StoredField {
 };
 
 // Colours are rounded to half precision (to nearest, ties to even; beyond its range to the
-// largest half): read the file back before using the field further, so that every stage gets
-// the values that a later run would get. Equal fields give equal bytes. Needs a few megabytes
-// of memory besides the field. A uniform grid's regrade_version is 1, an adaptive field's 2.
+// largest half), and so are splats but for their means: read the file back before using the
+// field further, so that every stage gets the values that a later run would get. Equal fields
+// give equal bytes. Needs a few megabytes of memory besides the field, of splats 16 B a splat.
+// A uniform grid's regrade_version is 1, an adaptive field's 2, that of splats 3.
 // Throws Error(kResources).
 void WriteFieldFile(const std::string& path, const StoredField& stored);
 

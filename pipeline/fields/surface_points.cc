@@ -9,6 +9,7 @@
 #include "kernels/base/error.h"
 #include "kernels/field/cpu/render_view.h"
 #include "kernels/field/packed_grid.h"
+#include "kernels/render/field_renderer.h"
 #include "pipeline/files/atomic_file.h"
 
 namespace regrade {
@@ -31,13 +32,13 @@ bool OnSurface(const RenderedView& view, int x, int y) {
 
 std::vector<SurfacePoint> SurfacePoints(const RadianceField& field,
                                         const std::vector<Camera>& cameras, int resolution) {
-  const FastGrid grid = MakeFastGrid(field);
+  const FieldRenderer renderer(field, Backend::kCpu);
   const Vec3f radius = field.geometry->frame.radius;
   const double side = 2.0 * std::max({radius.x, radius.y, radius.z}) / resolution;
   std::vector<SurfacePoint> points;
   std::unordered_set<uint64_t> taken;
   for (const Camera& camera : cameras) {
-    const RenderedView view = RenderView(grid, camera, MarchOptions{field.step});
+    const RenderedView view = renderer.Render(camera);
     const RigidTransform world_from_camera = camera.camera_from_world.Inverse();
     for (int y = 0; y < camera.height; ++y)
       for (int x = 0; x < camera.width; ++x) {

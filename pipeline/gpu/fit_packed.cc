@@ -88,8 +88,11 @@ FitOptions OptionsForCapture(const FitPackedOptions& settings, const FitOptions&
       {capture.scene.ndc.on(), backend == Backend::kCuda, pixels, box.background.has_value()});
   if (const std::string note = NoteOfAdapting(asked, adapted); !note.empty())
     std::fprintf(stderr, "%s\n", note.c_str());
-  PlannedFit fit = FitWithinMemory(
-      adapted, {backend, pixels, box, settings.max_memory_gb, settings.reproducible});
+  PlannedFit fit = FitWithinMemory(adapted, {.backend = backend,
+                                             .pixels = pixels,
+                                             .box = box,
+                                             .max_memory_gb = settings.max_memory_gb,
+                                             .reproducible = settings.reproducible});
   if (!fit.notice.empty()) std::fprintf(stderr, "%s\n", fit.notice.c_str());
   return fit.options;
 }

@@ -12,6 +12,7 @@
 #include "kernels/field/pad_sh_basis.h"
 #include "kernels/image/color_statistics.h"
 #include "kernels/image/resize.h"
+#include "kernels/render/field_renderer.h"
 #include "pipeline/capture/working_views.h"
 #include "pipeline/fields/field_file.h"
 #include "pipeline/fields/object_file.h"
@@ -80,10 +81,10 @@ Image RenderHome(const RadianceField& field, const Camera& home) {
   const double scale = std::min(1.0, double{kPoster} / std::max(home.width, home.height));
   const Camera camera = home.Resized(std::max(1, static_cast<int>(home.width * scale)),
                                      std::max(1, static_cast<int>(home.height * scale)));
-  const MarchOptions options{field.step};
-  return field.geometry->cells.on()
-             ? RenderView(FieldSeenBy(field, camera), camera, options).color
-             : RenderView(field, camera, options).color;
+  return FieldRenderer(field.geometry->cells.on() ? FieldSeenBy(field, camera) : field,
+                       Backend::kCpu)
+      .Render(camera)
+      .color;
 }
 
 void AddPhotos(const WorkingViews& views, bool named, PageContent* content) {
@@ -162,8 +163,7 @@ MadePage MakePage(const std::string& folder, const std::vector<std::string>& sty
   const int steps = 2 + static_cast<int>(styles.size());
   ReportOrThrow(progress, 0, steps);
   StoredField stored = ReadFieldFile(folder + "/field.npz");
-  const WorkingViews views = ReadWorkingViews(folder + "/poses", kChecked, 0)
-                                 .InField(stored.field_from_world, stored.ndc);
+  const WorkingViews views = ReadWorkingViews(folder + "/poses", kChecked, 0).InField(stored);
   PageContent content;
   content.served = options.served;
   EncodeScene(stored.field, views, options, &content);

@@ -71,15 +71,16 @@ struct ReconstructReport {
   // Of --preset paper: "llff: the cameras all look one way", and what was set by hand.
   std::string paper_config;
   std::vector<std::string> not_to_the_letter;
-  int finest_grid = 0;  // voxels a side
+  std::optional<int> finest_grid;  // voxels a side
   int64_t rays = 0;
   int sh_degree = 0;
-  int64_t voxels = 0;
+  // One of both kinds; `finest_grid` is of voxels.
+  std::optional<int64_t> voxels, splats;
   std::optional<int64_t> background_texels;
   Metric psnr_train_db;  // of the rays of the last steps
   // Of some rendered training views; see MeasuredTrainingViews.
   Metric ssim_train, detail_kept_train, detail_error_train;
-  int64_t rejected_voxels = 0;  // updates of voxels that were refused: gradient not finite
+  int64_t rejected_voxels = 0;  // updates of records that were refused: gradient not finite
   Metric psnr_heldout_db, ssim_heldout, detail_kept_heldout, detail_error_heldout;
   std::string sharpness;             // SharpnessWord of detail_kept, held out, or else training
   std::vector<std::string> heldout;  // the user's file names
@@ -98,6 +99,7 @@ struct ReconstructReport {
     visit("rays", rays);
     visit("sh_degree", sh_degree, {.label = "degree of view dependence"});
     visit("voxels", voxels, {.label = "voxels"});
+    visit("splats", splats, {.label = "splats"});
     visit("background_texels", background_texels, {.label = "background texels"});
     visit("psnr_train_db", psnr_train_db, {.label = "PSNR, training", .unit = "dB"});
     visit("ssim_train", ssim_train, {.label = "SSIM, training", .decimals = 3});

@@ -8,11 +8,43 @@
 #include "kernels/base/error.h"
 #include "kernels/device/device_memory.h"
 #include "pipeline/program/memory.h"
+#include "reconstruct/fit/adapt_options.h"
 
 namespace regrade {
 namespace {
 
 int Finest(const FitOptions& options) { return *std::ranges::max_element(options.resolutions); }
+
+uint64_t LimitOf(const FitPlace& place) {
+  return PlannedMemory(place.max_memory_gb,
+                       place.backend == Backend::kCuda
+                           ? static_cast<uint64_t>(ReadDeviceStatus().free_bytes)
+                           : ReadMemoryStatus().available);
+}
+
+bool MayLower(const FitPlace& place) { return !place.reproducible || place.max_memory_gb > 0; }
+
+std::string ToFitInto(const FitPlace& place) {
+  return std::string(" to fit into ") +
+         (place.max_memory_gb > 0 ? "--max-memory" : "free memory");
+}
+
+const char* MemoryOf(const FitPlace& place) {
+  return place.backend == Backend::kCuda ? "GPU memory" : "memory";
+}
+
+StagePlan PlanSplatsAt(const FitPlace& place, const SplatFitOptions& options) {
+  return place.backend == Backend::kCuda
+             ? PlanSplatFitOnDevice(options, place.pixels, place.photos)
+             : PlanSplatFit(options, place.pixels, place.photos, omp_get_max_threads());
+}
+
+SplatFitOptions AtMostOfPixels(SplatFitOptions options, const FitPlace& place) {
+  const float most = 1e-3f * static_cast<float>(place.pixels / kPixelsOfSplat);
+  options.thousands =
+      std::clamp(most, std::min(kLeastSplats, options.thousands), options.thousands);
+  return options;
+}
 
 }  // namespace
 
@@ -22,28 +54,49 @@ StagePlan PlanFitAt(const FitPlace& place, const FitOptions& options) {
              : PlanFit(options, place.pixels, place.box, omp_get_max_threads());
 }
 
+FitOptions AdaptedTo(const FitOptions& options, const FitPlace& place) {
+  return AdaptOptions(options, {place.device_coordinates, place.backend == Backend::kCuda,
+                                place.pixels, place.box.background.has_value()});
+}
+
 PlannedFit FitWithinMemory(FitOptions options, const FitPlace& place) {
-  const bool on_device = place.backend == Backend::kCuda, limited = place.max_memory_gb > 0;
-  const uint64_t limit = PlannedMemory(
-      place.max_memory_gb, on_device ? static_cast<uint64_t>(ReadDeviceStatus().free_bytes)
-                                     : ReadMemoryStatus().available);
   const auto plan_of = [&place](const FitOptions& of) { return PlanFitAt(place, of); };
   PlannedFit fit{std::move(options), {}, ""};
   const int finest = Finest(fit.options);
-  if ((!place.reproducible || limited) && LowerToMemory(plan_of, limit, &fit.options))
+  if (MayLower(place) && LowerToMemory(plan_of, LimitOf(place), &fit.options))
     fit.notice = (fit.options.adaptive() ? Format("the field has at most %.1f million cells",
                                                   double{fit.options.max_cells})
                                          : Concat("the finest grid has ", Finest(fit.options),
                                                   " voxels a side instead of ", finest)) +
-                 " to fit into " + (limited ? "--max-memory" : "free memory");
+                 ToFitInto(place);
   fit.plan = plan_of(fit.options);
-  CheckFitsMemory(fit.plan, limit, on_device ? "GPU memory" : "memory");
+  CheckFitsMemory(fit.plan, LimitOf(place), MemoryOf(place));
   return fit;
 }
 
-std::string MemoryWarning(const FitOptions& options, const FitPlace& place) {
+PlannedSplatFit SplatsWithinMemory(SplatFitOptions options, const FitPlace& place) {
+  const auto plan_of = [&place](const SplatFitOptions& of) { return PlanSplatsAt(place, of); };
+  PlannedSplatFit fit{AtMostOfPixels(options, place), {}, ""};
+  if (MayLower(place) && LowerSplatsToMemory(plan_of, LimitOf(place), &fit.options))
+    fit.notice =
+        Format("the field has at most %.0f thousand splats", double{fit.options.thousands}) +
+        ToFitInto(place);
+  fit.plan = plan_of(fit.options);
+  CheckFitsMemory(fit.plan, LimitOf(place), MemoryOf(place));
+  return fit;
+}
+
+StagePlan PlanFieldFit(const RunSettings& settings, const FitPlace& place) {
+  return settings.scene.UsesSplats()
+             ? PlanSplatsAt(place, AtMostOfPixels(settings.splats, place))
+             : PlanFitAt(place, AdaptedTo(settings.fit, place));
+}
+
+std::string MemoryWarning(const RunSettings& settings, const FitPlace& place) {
   try {
-    return FitWithinMemory(options, place).notice;
+    return settings.scene.UsesSplats()
+               ? SplatsWithinMemory(settings.splats, place).notice
+               : FitWithinMemory(AdaptedTo(settings.fit, place), place).notice;
   } catch (const Error& error) {
     if (error.code() != ExitCode::kResources) throw;
     return error.what_failed() + (error.hint().empty() ? "" : ": " + error.hint());

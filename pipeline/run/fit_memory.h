@@ -1,5 +1,5 @@
-// What a fit takes of the processor that it runs on, and what it is lowered to where that is
-// too much: one rule for `regrade run` and `regrade_gpu fit`.
+// What a fit of either kind of field takes of the processor that it runs on, and what it is
+// lowered to where that is too much: one rule for `regrade run` and `regrade_gpu fit`.
 #pragma once
 
 #include <cstdint>
@@ -7,13 +7,16 @@
 
 #include "kernels/device/backend.h"
 #include "pipeline/run/plan.h"
+#include "pipeline/run/run_settings.h"
 
 namespace regrade {
 
 struct FitPlace {
   Backend backend = Backend::kCpu;
   int64_t pixels = 0;  // of the photos that are fitted, at working size
+  int64_t photos = 0;  // that are fitted
   SceneBox box = {};
+  bool device_coordinates = false;
   double max_memory_gb = 0;   // of 10^9 bytes; 0: what is free
   bool reproducible = false;  // free memory must not change the fit
 };
@@ -30,8 +33,24 @@ struct PlannedFit {
 // to a given limit. Throws Error(kResources) if the plan takes too much all the same.
 PlannedFit FitWithinMemory(FitOptions options, const FitPlace& place);
 
+struct PlannedSplatFit {
+  SplatFitOptions options;
+  StagePlan plan;
+  std::string notice;
+};
+
+// The same of splats: first at most one for each kPixelsOfSplat pixels of the photos.
+inline constexpr int kPixelsOfSplat = 4;
+PlannedSplatFit SplatsWithinMemory(SplatFitOptions options, const FitPlace& place);
+
+// The plan of the field that the settings ask for, whatever its kind, before it is lowered.
+StagePlan PlanFieldFit(const RunSettings& settings, const FitPlace& place);
+
+// AdaptOptions for the place.
+FitOptions AdaptedTo(const FitOptions& options, const FitPlace& place);
+
 // What a person should know of the fit's memory before it begins: that less than it takes is
 // free, and what it is lowered to; or nothing.
-std::string MemoryWarning(const FitOptions& options, const FitPlace& place);
+std::string MemoryWarning(const RunSettings& settings, const FitPlace& place);
 
 }  // namespace regrade

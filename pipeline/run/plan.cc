@@ -1,6 +1,7 @@
 #include "pipeline/run/plan.h"
 
 #include <algorithm>
+#include <cmath>
 
 #include "kernels/base/error.h"
 #include "kernels/field/packed_grid.h"
@@ -120,6 +121,60 @@ StagePlan PlanFitOnDevice(const FitOptions& options, int64_t photo_pixels,
   return {static_cast<uint64_t>(peak + 6.0 * static_cast<double>(photo_pixels)), seconds};
 }
 
+namespace {
+
+// Values and Adam's moments.
+double SplatStateBytes(const SplatFitOptions& options) {
+  return 3 * 4.0 * (11 + 3 * BasisOfDegree(options.sh_degree));
+}
+
+// Of all steps, with seconds for a pixel of a photo and for a splat of a step.
+double SplatSeconds(const SplatFitOptions& options, int64_t photo_pixels, int64_t photos,
+                    double of_pixel, double of_splat) {
+  const double pixels =
+      static_cast<double>(photo_pixels) / static_cast<double>(std::max<int64_t>(photos, 1));
+  const double part = 1 - 0.75 * double{options.small_until};  // steps at half size
+  return options.steps *
+         (of_pixel * pixels * part + of_splat * 500.0 * double{options.thousands});
+}
+
+}  // namespace
+
+StagePlan PlanSplatFit(const SplatFitOptions& options, int64_t photo_pixels, int64_t photos,
+                       int threads) {
+  constexpr double kEntries = 6, kEntryBytes = 12 + 48, kSeenBytes = 100, kPhotoBytes = 12 + 8,
+                   kOfPixel = 150e-9, kOfSplat = 900e-9;
+  const double splats = 1000.0 * double{options.thousands};
+  const double bytes =
+      splats * (SplatStateBytes(options) + kSeenBytes + kEntries * kEntryBytes);
+  return {
+      static_cast<uint64_t>(kProgramBytes + bytes +
+                            kPhotoBytes * static_cast<double>(photo_pixels)),
+      SecondsWith(SplatSeconds(options, photo_pixels, photos, kOfPixel, kOfSplat), threads)};
+}
+
+StagePlan PlanSplatFitOnDevice(const SplatFitOptions& options, int64_t photo_pixels,
+                               int64_t photos) {
+  constexpr double kEntries = 11, kEntryBytes = 24 + 88, kSeenBytes = 104, kPhotoBytes = 6,
+                   kLeast = 300e6, kOfPixel = 1.5e-9, kOfSplat = 3e-9;
+  const double splats = 1000.0 * double{options.thousands};
+  const double bytes =
+      splats * (SplatStateBytes(options) + kSeenBytes + kEntries * kEntryBytes);
+  return {
+      static_cast<uint64_t>(kLeast + bytes + kPhotoBytes * static_cast<double>(photo_pixels)),
+      SplatSeconds(options, photo_pixels, photos, kOfPixel, kOfSplat)};
+}
+
+bool LowerSplatsToMemory(const std::function<StagePlan(const SplatFitOptions&)>& plan_of,
+                         uint64_t limit, SplatFitOptions* options) {
+  bool lowered = false;
+  while (limit > 0 && options->thousands > kLeastSplats && plan_of(*options).memory > limit) {
+    options->thousands = std::max(kLeastSplats, std::floor(0.9f * options->thousands));
+    lowered = true;
+  }
+  return lowered;
+}
+
 StagePlan PlanPoses(int64_t photos, int threads) {
   return {0, SecondsWith(kPoseSecondsPerPhoto * static_cast<double>(photos), threads)};
 }
@@ -147,7 +202,8 @@ void CheckFitsMemory(const StagePlan& plan, uint64_t limit, const char* memory) 
   throw ResourceError(
       "the fit would take about " + MemoryText(static_cast<double>(plan.memory)) + " of " +
           memory + ", the limit is " + MemoryText(static_cast<double>(limit)),
-      "reconstruct", "use --preset draft, smaller --fit-resolutions or --fit-max-cells");
+      "reconstruct",
+      "use --preset draft, smaller --fit-resolutions, --fit-max-cells or --splats");
 }
 
 bool LowerToMemory(const std::function<StagePlan(const FitOptions&)>& plan_of, uint64_t limit,

@@ -20,6 +20,7 @@
 
 #include "reconstruct/fit/fit_options.h"
 #include "reconstruct/scene/scene_box.h"
+#include "reconstruct/splats/splat_fit_options.h"
 
 namespace regrade {
 
@@ -57,6 +58,16 @@ StagePlan PlanFit(const FitOptions& options, int64_t photo_pixels, const SceneBo
 // an adaptive field, and values or moments of the field before beside a new one; 6 B per pixel;
 // and the buffer of samples in flight.
 StagePlan PlanFitOnDevice(const FitOptions& options, int64_t photo_pixels, const SceneBox& box);
+// Of splats. On a CPU a splat is taken to have 6 entries, on a card 11; a step's time grows
+// with the photo's pixels and, half of the most on average, with the splats.
+StagePlan PlanSplatFit(const SplatFitOptions& options, int64_t photo_pixels, int64_t photos,
+                       int threads);
+StagePlan PlanSplatFitOnDevice(const SplatFitOptions& options, int64_t photo_pixels,
+                               int64_t photos);
+// Lowers the most splats, to no less than kLeastSplats thousands, as LowerToMemory does.
+inline constexpr float kLeastSplats = 5;
+bool LowerSplatsToMemory(const std::function<StagePlan(const SplatFitOptions&)>& plan_of,
+                         uint64_t limit, SplatFitOptions* options);
 StagePlan PlanPoses(int64_t photos, int threads);
 StagePlan PlanTracks(int64_t photos, int threads);
 StagePlan PlanStyle(int64_t steps, int threads);

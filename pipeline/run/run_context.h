@@ -42,8 +42,9 @@ struct RunContext {
   // Of the finished stage "pose", with the gains of "reconstruct"; cameras in the capture's
   // world.
   WorkingViews Views() const {
-    return ReadWorkingViews(workspace->Path("poses"), settings.scene.photo_size,
-                            settings.run.holdout);
+    const WorkingViews views = ReadWorkingViews(
+        workspace->Path("poses"), settings.scene.photo_size, settings.run.holdout);
+    return settings.scene.UsesSplats() ? views.Pinholes() : views;
   }
   // Where a stage has its record and its results. A style must be chosen for a stage of one.
   Workspace& FolderOf(const std::string& stage) const {

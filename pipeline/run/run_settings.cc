@@ -4,6 +4,7 @@
 #include <iterator>
 
 #include "kernels/base/error.h"
+#include "pipeline/capture/scene_profile.h"
 #include "pipeline/images/cube_file.h"
 #include "pipeline/run/paper_config.h"
 #include "pipeline/run/vignette.h"
@@ -18,6 +19,7 @@ void RunSettings::Bind(OptionSet* options) {
   options->Add("Poses", &pose);
   options->Add("Scene", &scene);
   options->Add("Fit", &fit);
+  options->Add("Fit", &splats);
   options->Add("Style", &style);
   options->Add("2D method", &style_2d);
   options->Add("Object", &object);
@@ -28,6 +30,11 @@ void RunSettings::Bind(OptionSet* options) {
   options->Add("Evaluation", &consistency);
   options->Add("Page", &page);
   options->Add("Program", &program);
+}
+
+JsonValue OptionsOfFit(const RunSettings& settings) {
+  return settings.scene.UsesSplats() ? OptionValues(settings.scene, settings.splats)
+                                     : OptionValues(settings.scene, settings.fit);
 }
 
 namespace {
@@ -91,6 +98,22 @@ void CheckRequirements(const RunSettings& settings) {
   }
 }
 
+// What belongs to voxels alone.
+void CheckSplats(const RunSettings& settings) {
+  if (!settings.scene.UsesSplats()) return;
+  if (settings.run.preset == "paper")
+    throw UsageError("the paper's field has voxels", "--field splats and --preset paper",
+                     "leave one of them out");
+  const auto effects = ParseEffects(settings.run.effects);
+  for (const char* name : {"ndc", "background"})
+    if (const auto effect = effects.find(name); effect != effects.end() && effect->second)
+      throw UsageError("belongs to voxels", Concat("--effects ", name, "=on"),
+                       "leave it out, or use --field voxels");
+  if (settings.splats.sh_degree > 2)
+    throw UsageError("styles know harmonics up to degree 2", "--splat-degree",
+                     "give 0, 1 or 2");
+}
+
 }  // namespace
 
 bool MeasuresFilm(const RunSettings& settings) {
@@ -112,6 +135,7 @@ void CheckTogether(const RunSettings& settings) {
           Concat("belongs to a uniform field, with a side for each of ", grids, " stages"),
           flag, "leave it out, or give --fit-field uniform and the sides");
   CheckPaper(settings.run.preset, settings.run.paper_config, settings.fit.field);
+  CheckSplats(settings);
   const StyleMethod method = ParseStyleMethod(settings.style_2d);
   CheckResidual(settings, method.kind);
   CheckMatch(settings);

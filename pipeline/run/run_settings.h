@@ -16,6 +16,7 @@
 #include "reconstruct/colmap/poses_from_photos.h"
 #include "reconstruct/fit/fit_options.h"
 #include "reconstruct/scene/box_options.h"
+#include "reconstruct/splats/splat_fit_options.h"
 #include "stylize/image/style_options.h"
 #include "stylize/training/train_network.h"
 
@@ -23,6 +24,7 @@ namespace regrade {
 
 struct SceneOptions {
   int photo_size = 800;
+  std::string field = "voxels";
   BoxOptions box;
 
   template <typename Bind>
@@ -33,8 +35,13 @@ struct SceneOptions {
                   "their places; time grows with its square",
           .min = 64,
           .max = 16384});
+    bind("field", field,
+         {.help = "what the scene is made of: splats are 3D Gaussians, fitted by MCMC; voxels "
+                  "are a Plenoxel field",
+          .choices = "voxels|splats"});
     box.Describe(bind);
   }
+  bool UsesSplats() const { return field == "splats"; }
 };
 
 struct StyleSource {
@@ -144,6 +151,7 @@ struct RunSettings {
   PoseOptions pose;
   SceneOptions scene;
   FitOptions fit;
+  SplatFitOptions splats;
   StyleSource style;
   StyleOptions style_2d;
   MaskOptions object;
@@ -155,7 +163,17 @@ struct RunSettings {
 
   // Under the headings of the help.
   void Bind(OptionSet* options);
+
+  // `run.effects`, and what the kind of field needs none of: splats lie in the world, far ones
+  // too.
+  std::string Effects() const {
+    return run.effects + (scene.UsesSplats() ? ",ndc=off,background=off" : "");
+  }
+  int sh_degree() const { return scene.UsesSplats() ? splats.sh_degree : fit.sh_degree; }
 };
+
+// The options that a field of the settings' kind depends on.
+JsonValue OptionsOfFit(const RunSettings& settings);
 
 // What --match cannot go with. Throws Error(kUsage).
 void CheckMatch(const RunSettings& settings);

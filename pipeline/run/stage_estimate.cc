@@ -6,7 +6,6 @@
 #include "pipeline/fields/film_timing.h"
 #include "pipeline/run/fit_memory.h"
 #include "pipeline/run/plan.h"
-#include "reconstruct/fit/adapt_options.h"
 
 namespace regrade {
 namespace {
@@ -36,10 +35,8 @@ double PoseSeconds(const CaptureSize& size, int threads) {
 }
 
 StagePlan FitPlan(const RunSettings& settings, const CaptureSize& size, Backend backend) {
-  const int64_t pixels = PixelsToFit(settings, size);
-  const FitOptions fit =
-      AdaptOptions(settings.fit, {.on_card = backend == Backend::kCuda, .pixels = pixels});
-  return PlanFitAt({backend, pixels, SceneBox()}, fit);
+  return PlanFieldFit(settings,
+                      {backend, PixelsToFit(settings, size), PhotosToFit(settings, size)});
 }
 
 double RenderSeconds(const RunSettings& settings, const CaptureSize& size) {
@@ -83,11 +80,14 @@ CaptureSize SizeOfCapture(const Capture& capture) {
   return size;
 }
 
-int64_t PixelsToFit(const RunSettings& settings, const CaptureSize& size) {
+int64_t PhotosToFit(const RunSettings& settings, const CaptureSize& size) {
   const int holdout = settings.run.holdout;
-  const int64_t held_out = holdout > 0 ? (size.photos + holdout - 1) / holdout : 0;
+  return size.photos - (holdout > 0 ? (size.photos + holdout - 1) / holdout : 0);
+}
+
+int64_t PixelsToFit(const RunSettings& settings, const CaptureSize& size) {
   return std::llround(1e6 * Megapixels(size, settings.scene.photo_size) *
-                      static_cast<double>(size.photos - held_out));
+                      static_cast<double>(PhotosToFit(settings, size)));
 }
 
 std::vector<StageEstimate> EstimateStages(const RunSettings& settings, const CaptureSize& size,

@@ -22,7 +22,8 @@ struct CaptureSize {
 
 CaptureSize SizeOfCapture(const Capture& capture);
 
-// Pixels of the photos that are fitted, at working size.
+// Photos that are fitted, and their pixels at working size.
+int64_t PhotosToFit(const RunSettings& settings, const CaptureSize& size);
 int64_t PixelsToFit(const RunSettings& settings, const CaptureSize& size);
 
 struct StageEstimate {

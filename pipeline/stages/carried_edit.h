@@ -7,10 +7,10 @@
 #include <vector>
 
 #include "evaluate/frame_source.h"
+#include "kernels/render/field_renderer.h"
 #include "kernels/scene/camera.h"
 #include "kernels/scene/image.h"
 #include "pipeline/capture/working_views.h"
-#include "pipeline/fields/field_renderer.h"
 #include "pipeline/run/residual_choice.h"
 
 namespace regrade {

@@ -5,6 +5,7 @@
 #include "kernels/base/error.h"
 #include "kernels/field/cpu/render_view.h"
 #include "kernels/field/packed_grid.h"
+#include "kernels/render/field_renderer.h"
 #include "stylize/field/coefficient_fit.h"
 
 namespace regrade {
@@ -16,10 +17,10 @@ constexpr int64_t kMostRays = 600000;  // 0.6 GB with what they see
 // What the field lacks to the pictures.
 std::vector<Image> Missing(const RadianceField& field, const std::vector<Camera>& cameras,
                            const FrameSource& pictures) {
-  const FastGrid grid = MakeFastGrid(field);
+  const FieldRenderer renderer(field, Backend::kCpu);
   std::vector<Image> missing;
   for (size_t i = 0; i < cameras.size(); ++i) {
-    Image lack = RenderView(grid, cameras[i], MarchOptions{field.step}).color;
+    Image lack = renderer.Render(cameras[i]).color;
     const Image picture = pictures.frame(static_cast<int>(i));
     REGRADE_CHECK(picture.SameSize(lack) && picture.channels >= 3);
     for (int64_t p = 0; p < lack.num_pixels(); ++p)

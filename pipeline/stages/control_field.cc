@@ -6,6 +6,7 @@
 
 #include "kernels/field/cpu/render_view.h"
 #include "kernels/field/packed_grid.h"
+#include "kernels/render/field_renderer.h"
 #include "pipeline/fields/network_file.h"
 #include "pipeline/program/device_choice.h"
 #include "pipeline/stages/fit_pictures.h"
@@ -19,7 +20,7 @@ JsonValue InputsOfFit(const RunContext& context) {
   const RunSettings& settings = context.settings;
   return JsonValue::Object{{"field", context.ResultOf("reconstruct")},
                            {"views_2d", context.ResultOf("style_2d")},
-                           {"fit", OptionValues(settings.scene, settings.fit)},
+                           {"fit", OptionsOfFit(settings)},
                            {"effects", settings.run.effects},
                            {"strength", settings.style.strength},
                            {"holdout", settings.run.holdout},
@@ -55,16 +56,13 @@ StoredField ControlField(RunContext* context, const WorkingViews& views,
 NamedFrameSource ControlFieldFrames(const StoredField& stored,
                                     const std::vector<Camera>& cameras, const PhotoGains& gains,
                                     const std::string& name) {
-  const auto grid = std::make_shared<const FastGrid>(MakeFastGrid(stored.field));
-  return {name,
-          {static_cast<int>(cameras.size()),
-           [grid, cameras, gains, step = stored.field.step](int i) {
-             Image frame =
-                 RenderView(*grid, cameras[static_cast<size_t>(i)], MarchOptions{step}).color;
-             PutGain(gains.Of(i), &frame);
-             for (float& value : frame.pixels) value = std::round(255 * value) / 255;
-             return frame;
-           }}};
+  const auto renderer = std::make_shared<const FieldRenderer>(stored.field, Backend::kCpu);
+  return {name, {static_cast<int>(cameras.size()), [renderer, cameras, gains](int i) {
+                   Image frame = renderer->Render(cameras[static_cast<size_t>(i)]).color;
+                   PutGain(gains.Of(i), &frame);
+                   for (float& value : frame.pixels) value = std::round(255 * value) / 255;
+                   return frame;
+                 }}};
 }
 
 }  // namespace regrade

@@ -16,6 +16,7 @@
 #include "kernels/base/error.h"
 #include "kernels/field/cpu/render_view.h"
 #include "kernels/field/packed_grid.h"
+#include "kernels/render/field_renderer.h"
 #include "kernels/scene/common_camera.h"
 #include "pipeline/capture/working_views.h"
 #include "pipeline/fields/field_file.h"
@@ -84,11 +85,10 @@ struct ViewControls {
 
 // Depth at each camera, rendered on demand.
 GeometrySource GeometryOf(const RadianceField& field, const std::vector<Camera>& cameras) {
-  const auto grid = std::make_shared<const FastGrid>(MakeFastGrid(field));
-  return [grid, cameras, step = field.step](int i) -> FrameGeometry {
+  const auto renderer = std::make_shared<const FieldRenderer>(field, Backend::kCpu);
+  return [renderer, cameras](int i) -> FrameGeometry {
     const Camera& camera = cameras[i];
-    return {DepthAlongRays(camera, RenderView(*grid, camera, MarchOptions{step}).depth),
-            camera};
+    return {DepthAlongRays(camera, renderer->Render(camera).depth), camera};
   };
 }
 
@@ -198,7 +198,7 @@ StageOutcome Evaluate(RunContext* context, const ProgressFunction& progress) {
   const RunSettings& settings = context->settings;
   Workspace& workspace = *context->style;
   const StoredField stored = ReadFieldFile(context->workspace->Path("field.npz"));
-  const WorkingViews views = context->Views().InField(stored.field_from_world, stored.ndc);
+  const WorkingViews views = context->Views().InField(stored);
   std::vector<int> all(views.count());
   for (size_t i = 0; i < all.size(); ++i) all[i] = static_cast<int>(i);
   const std::vector<int> training_views = StyledViews(workspace, views);

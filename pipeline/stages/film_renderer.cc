@@ -18,9 +18,8 @@ std::string PrepareFilm(const RunSettings& settings, bool film_of_views, FieldRe
   return why;
 }
 
-std::string FilmRendererText(const std::string& why_exact, Backend backend) {
-  if (!why_exact.empty()) return "exact (" + why_exact + ")";
-  return backend == Backend::kCuda ? kFastRendererOfGpu : kFastRendererOfCpu;
+std::string FilmRendererText(const std::string& why_exact, const FieldRenderer& renderer) {
+  return why_exact.empty() ? renderer.FastText() : "exact (" + why_exact + ")";
 }
 
 }  // namespace regrade

@@ -3,7 +3,7 @@
 
 #include <string>
 
-#include "pipeline/fields/field_renderer.h"
+#include "kernels/render/field_renderer.h"
 #include "pipeline/run/run_settings.h"
 
 namespace regrade {
@@ -21,7 +21,7 @@ std::string WhyExactFilm(const RunSettings& settings, bool film_of_views);
 std::string PrepareFilm(const RunSettings& settings, bool film_of_views, FieldRenderer* source,
                         FieldRenderer* styled);
 
-// For the console and the report: the processor's fast renderer, or "exact (REASON)".
-std::string FilmRendererText(const std::string& why_exact, Backend backend);
+// For the console and the report: the fast renderer, or "exact (REASON)".
+std::string FilmRendererText(const std::string& why_exact, const FieldRenderer& renderer);
 
 }  // namespace regrade

@@ -5,8 +5,7 @@
 
 #include "kernels/base/error.h"
 #include "pipeline/capture/scene_profile.h"
-#include "reconstruct/fit/adapt_options.h"
-#include "reconstruct/fit/fit_field.h"
+#include "pipeline/stages/field_fit.h"
 
 namespace regrade {
 namespace {
@@ -14,8 +13,8 @@ namespace {
 // The box in which the scene's own field was fitted; its frame may reach further out.
 SceneBox BoxOf(const Capture& capture, const RunSettings& settings, const Vec3f& background) {
   // The box does not depend on exposures, and measuring them would read every photo.
-  SceneBox box = ProfileScene(capture, settings.fit.sh_degree,
-                              settings.run.effects + ",exposure=off", settings.scene.box)
+  SceneBox box = ProfileScene(capture, settings.sh_degree(),
+                              settings.Effects() + ",exposure=off", settings.scene.box)
                      .scene.box;
   if (box.background) box.background = background;
   return box;
@@ -53,16 +52,17 @@ FittedPictures FitPictures(const WorkingViews& views, const StoredField& scene,
   if (training_views.empty())
     throw InputError("the 2D method has a picture of none of the photos", "views_2d");
   const SceneBox box = BoxOf(views.capture(), settings, background);
-  FitOptions options = AdaptOptions(settings.fit, {scene.ndc.on(), backend == Backend::kCuda,
-                                                   pixels, box.background.has_value()});
-  options.seed = settings.run.seed;
-  if (settings.run.reproducible && options.shards == 0) options.shards = kReproducibleShards;
-  options.sh_degree = std::min(options.sh_degree, DegreeOf(scene.field));
-  FitHooks hooks;
-  hooks.progress = progress;
-  FitResult fit = FitField(training_views, box, options, hooks, backend);
-  FittedPictures fitted{{std::move(fit.field), scene.field_from_world, scene.ndc},
-                        fit.psnr_train_db};
+  const std::unique_ptr<FieldFit> fit =
+      MakeFieldFit(settings, {.backend = backend,
+                              .pixels = pixels,
+                              .photos = std::ssize(training_views),
+                              .box = box,
+                              .device_coordinates = scene.ndc.on()});
+  fit->LimitDegree(DegreeOf(scene.field));
+  FittedField field =
+      fit->Run(training_views, {.progress = progress, .checkpoint = {}, .note = ""});
+  FittedPictures fitted{{std::move(field.field), scene.field_from_world, scene.ndc},
+                        field.psnr_train_db};
   RoundAsStored(&fitted.stored.field.appearance);
   return fitted;
 }

@@ -7,6 +7,7 @@
 #include "kernels/field/cpu/render_view.h"
 #include "kernels/field/packed_grid.h"
 #include "kernels/image/color_statistics.h"
+#include "kernels/render/field_renderer.h"
 #include "pipeline/stages/frame_gains.h"
 #include "stylize/image/monge_kantorovich.h"
 
@@ -72,10 +73,9 @@ std::optional<double> LinearMapPsnr(const RadianceField& field,
   RadianceField mapped = field;
   mapped.appearance = ApplyColorMap(field.appearance, *better);
   mapped.background = MapBackground(*better, field.background);
-  const FastGrid grid = MakeFastGrid(mapped);
-  const FrameSource rendered{
-      source.count,
-      [&](int i) { return RenderView(grid, cameras[i], MarchOptions{field.step}).color; }};
+  const FieldRenderer renderer(mapped, Backend::kCpu);
+  const FrameSource rendered{source.count,
+                             [&](int i) { return renderer.Render(cameras[i]).color; }};
   return MeasureFidelity({"linear_map", PutGains(rendered, gains)},
                          {views_2d, transmittance, nullptr, {}, {}, /*only_psnr=*/true},
                          progress)

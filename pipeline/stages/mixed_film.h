@@ -6,8 +6,8 @@
 #include <vector>
 
 #include "kernels/base/progress.h"
+#include "kernels/render/field_renderer.h"
 #include "pipeline/fields/field_file.h"
-#include "pipeline/fields/field_renderer.h"
 #include "pipeline/page/keyframes.h"
 
 namespace regrade {

@@ -43,16 +43,15 @@ ObjectWeights VoteForObject(const RunSettings& settings, const WorkingViews& wor
   return weights;
 }
 
-CoverageRenderer::CoverageRenderer(const RadianceField& field, const ObjectWeights& weights)
-    : step_(field.step) {
+CoverageRenderer::CoverageRenderer(const RadianceField& field, const ObjectWeights& weights) {
   for (const std::vector<float>& region : weights.regions)
-    grids_.push_back(MakeFastGrid(WeightField(field, region)));
+    renderers_.emplace_back(WeightField(field, region), Backend::kCpu);
 }
 
 std::vector<Image> CoverageRenderer::Render(const Camera& camera) const {
   std::vector<Image> coverage;
-  for (const FastGrid& grid : grids_) {
-    const Image color = RenderView(grid, camera, MarchOptions{step_}).color;
+  for (const FieldRenderer& renderer : renderers_) {
+    const Image color = renderer.Render(camera).color;
     Image region(color.width, color.height, 1);
     for (int64_t i = 0; i < region.num_pixels(); ++i) {
       const float m = color.pixels[3 * i];

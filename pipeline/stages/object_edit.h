@@ -8,6 +8,7 @@
 
 #include "kernels/field/packed_grid.h"
 #include "kernels/field/radiance_field.h"
+#include "kernels/render/field_renderer.h"
 #include "kernels/scene/capture.h"
 #include "pipeline/capture/object_masks.h"
 #include "pipeline/fields/object_file.h"
@@ -32,7 +33,7 @@ class CoverageRenderer {
 
  private:
   float step_;
-  std::vector<FastGrid> grids_;
+  std::vector<FieldRenderer> renderers_;
 };
 
 }  // namespace regrade

@@ -6,7 +6,7 @@
 
 #include "evaluate/image_quality.h"
 #include "kernels/image/detail_kept.h"
-#include "pipeline/fields/field_renderer.h"
+#include "kernels/render/field_renderer.h"
 
 namespace regrade {
 namespace {
@@ -28,7 +28,7 @@ std::optional<double> MeanOf(const std::vector<double>& values) {
 PhotoMetrics MeasureOnPhotos(
     const WorkingViews& views, const std::vector<int>& of, const StoredField& stored,
     Backend backend, const std::function<double(const Image&, const Image&)>& perceptual) {
-  const WorkingViews as_taken = views.AsTaken().InField(stored.field_from_world, stored.ndc);
+  const WorkingViews as_taken = views.AsTaken().InField(stored);
   const FieldRenderer renderer(stored.field, backend);
   PhotoMetrics metrics;
   for (const int i : of) {

@@ -10,7 +10,6 @@
 #include "pipeline/capture/scene_profile.h"
 #include "pipeline/capture/working_views.h"
 #include "pipeline/fields/field_file.h"
-#include "pipeline/fields/fit_checkpoint.h"
 #include "pipeline/files/text.h"
 #include "pipeline/program/cpu_time.h"
 #include "pipeline/program/device_choice.h"
@@ -19,13 +18,11 @@
 #include "pipeline/run/paper_config.h"
 #include "pipeline/run/paper_traits.h"
 #include "pipeline/run/run_context.h"
+#include "pipeline/stages/field_fit.h"
 #include "pipeline/stages/photo_metrics.h"
 #include "pipeline/stages/stages.h"
 #include "pipeline/workspace/folder_size.h"
 #include "pipeline/workspace/metrics_json.h"
-#include "reconstruct/fit/adapt_options.h"
-#include "reconstruct/fit/choose_degree.h"
-#include "reconstruct/fit/fit_field.h"
 
 namespace regrade {
 namespace {
@@ -33,9 +30,6 @@ namespace {
 constexpr double kAfterFit =
     0.08;  // pruning, writing and measuring, as a fraction of the steps' time
 constexpr double kTrial = 0.08;  // the trial of degrees, likewise
-
-// To a thousandth, for charts.
-double Rounded(double value) { return std::round(value * 1000) / 1000; }
 
 void SetPhotoMetrics(const PhotoMetrics& held_out, const PhotoMetrics& train,
                      ReconstructReport* metrics) {
@@ -73,8 +67,6 @@ std::string QualityLine(const ReconstructReport& metrics) {
          (held_out ? " on held-out photos" : " on training photos");
 }
 
-int Finest(const FitOptions& options) { return *std::ranges::max_element(options.resolutions); }
-
 int64_t PixelsToFit(const WorkingViews& views) {
   int64_t pixels = 0;
   for (const int i : views.Training()) {
@@ -84,44 +76,38 @@ int64_t PixelsToFit(const WorkingViews& views) {
   return pixels;
 }
 
-// The fit's options for the scene, lowered to fit into memory, which is reported.
-FitOptions OptionsForScene(RunContext* context, const NormalizedScene& scene, int64_t pixels,
-                           Backend backend) {
-  const RunSettings& settings = context->settings;
-  const FitOptions adapted = AdaptOptions(
-      settings.fit,
-      {scene.ndc.on(), backend == Backend::kCuda, pixels, scene.box.background.has_value()});
-  if (const std::string note = NoteOfAdapting(settings.fit, adapted); !note.empty())
-    context->console->Info(note);
-  PlannedFit fit = FitWithinMemory(
-      adapted,
-      {backend, pixels, scene.box, settings.run.max_memory_gb, settings.run.reproducible});
-  if (!fit.notice.empty()) context->console->Info(fit.notice);
-  context->console->Info("the fit will take " + PlanText(fit.plan));
-  fit.options.seed = settings.run.seed;
-  return fit.options;
+FitPlace PlaceOf(const RunSettings& settings, const WorkingViews& views,
+                 const NormalizedScene& scene) {
+  return {.backend = ChooseBackend(settings.run.device, settings.run.reproducible),
+          .pixels = PixelsToFit(views),
+          .photos = std::ssize(views.Training()),
+          .box = scene.box,
+          .device_coordinates = scene.ndc.on(),
+          .max_memory_gb = settings.run.max_memory_gb,
+          .reproducible = settings.run.reproducible};
 }
 
 // Decides whether the fit keeps its spherical harmonics, with the evidence.
-EffectReport ProfileViewDependence(const RunSettings& settings, const FitOptions& options,
-                                   const std::vector<TrainingView>& views, const SceneBox& box,
-                                   const ProgressFunction& progress, Backend backend) {
+EffectReport ProfileViewDependence(const RunSettings& settings, FieldFit* fit,
+                                   const std::vector<TrainingView>& views,
+                                   const ProgressFunction& progress) {
   const auto row = [](bool on, const Metric& value, const std::string& evidence) {
     return EffectReport{kViewDependence, on, evidence, value, kDegreePays};
   };
   const auto overrides = ParseEffects(settings.run.effects);
   const auto override = overrides.find(kViewDependence);
   const bool allowed = override == overrides.end() || override->second;
-  if (options.sh_degree == 0 || !allowed) return row(false, Metric(), "set by options");
+  if (fit->sh_degree() == 0 || !allowed) return row(false, Metric(), "set by options");
   if (override != overrides.end()) return row(true, Metric(), "set by options");
   if (views.size() < kLeastTrialViews)
     return row(true, Metric(), "too few photos for a trial with held-out ones");
-  const DegreeTrial trial = TryDegrees(views, box, options, progress, backend);
-  if (!std::isfinite(trial.gain_db))
+  const std::optional<DegreeTrial> trial = fit->TryHarmonics(views, progress);
+  if (!trial) return row(true, Metric(), "splats keep their harmonics");
+  if (!std::isfinite(trial->gain_db))
     return row(true, Metric(), "too few unmasked pixels for a trial with held-out photos");
   return row(
-      trial.Pays(), trial.gain_db,
-      Concat("dB that harmonics of degree ", options.sh_degree,
+      trial->Pays(), trial->gain_db,
+      Concat("dB that harmonics of degree ", fit->sh_degree(),
              " gain over one colour for all directions, in a small trial on a held-out fifth "
              "of the views"));
 }
@@ -141,12 +127,11 @@ StageOutcome Reconstruct(RunContext* context, const JsonValue& inputs,
                          const ProgressFunction& progress) {
   const RunSettings& settings = context->settings;
   Workspace& workspace = *context->workspace;
-  const WorkingViews as_taken(ReadCapture(workspace.Path("poses")), settings.scene.photo_size,
-                              settings.run.holdout);
+  const WorkingViews as_taken = context->Views().AsTaken();
   const Capture& capture = as_taken.capture();
   RequireEnough(capture, settings.pose.min_photos, workspace.Path("poses"));
   SceneProfile profile =
-      ProfileScene(capture, settings.fit.sh_degree, settings.run.effects, settings.scene.box);
+      ProfileScene(capture, settings.sh_degree(), settings.Effects(), settings.scene.box);
   const NormalizedScene& scene = profile.scene;
   const WorkingViews views =
       as_taken.WithGains(profile.gains).InField(scene.field_from_world, scene.ndc);
@@ -154,17 +139,19 @@ StageOutcome Reconstruct(RunContext* context, const JsonValue& inputs,
   for (const EffectReport& effect : profile.effects)
     if (effect.name != kViewDependence) context->console->Detail(EffectLine(effect));
   for (const std::string& notice : profile.notices) context->console->Info(notice);
-  const Backend backend = ChooseBackend(settings.run.device, settings.run.reproducible);
-  FitOptions options = OptionsForScene(context, scene, PixelsToFit(views), backend);
+  const FitPlace place = PlaceOf(settings, views, scene);
+  const Backend backend = place.backend;
+  const std::unique_ptr<FieldFit> fit = MakeFieldFit(settings, place);
+  for (const std::string& sentence : fit->FitIntoMemory()) context->console->Info(sentence);
 
-  const std::vector<int> fitted = views.Training();
+  const std::vector<int> training = views.Training();
   std::vector<Image> photos;
-  photos.reserve(fitted.size());
+  photos.reserve(training.size());
   std::vector<TrainingView> training_views;
   std::vector<std::vector<SeenPoint>> seen =
-      PointsSeenBy(capture, fitted, scene.field_from_world);
-  for (size_t f = 0; f < fitted.size(); ++f) {
-    const int i = fitted[f];
+      PointsSeenBy(capture, training, scene.field_from_world);
+  for (size_t f = 0; f < training.size(); ++f) {
+    const int i = training[f];
     Image photo = views.PhotoToFit(i);
     if (photo.empty()) {
       context->console->Info(views.View(i).file + ": its mask leaves nothing to fit");
@@ -174,19 +161,13 @@ StageOutcome Reconstruct(RunContext* context, const JsonValue& inputs,
     training_views.push_back({views.CameraOf(i), &photos.back(), std::move(seen[f])});
   }
 
-  if (settings.run.reproducible && options.shards == 0) options.shards = kReproducibleShards;
-  FitHooks hooks;
-  std::string measured;  // the row of view dependence: must survive an interruption
-  hooks.checkpoint = [&](const FitState& state) {
-    workspace.SaveCheckpoint("reconstruct", inputs, PackFitState(state, measured).Pieces());
+  FieldFitHooks hooks;  // its note is the row of view dependence: must survive a stop
+  hooks.checkpoint = [&](const std::vector<std::string_view>& pieces) {
+    workspace.SaveCheckpoint("reconstruct", inputs, pieces);
   };
-  std::optional<FitState> resume;
-  if (const auto bytes = workspace.LoadCheckpoint("reconstruct", inputs))
-    resume = UnpackFitState(*bytes, &measured);
-  if (resume) {
-    hooks.resume = &*resume;
-    context->console->Info("reconstruct: continues from its checkpoint");
-  }
+  const auto bytes = workspace.LoadCheckpoint("reconstruct", inputs);
+  const bool resumes = bytes && fit->UseCheckpoint(*bytes, &hooks.note);
+  if (resumes) context->console->Info("reconstruct: continues from its checkpoint");
   if (training_views.empty())
     throw InputError(
         "leave nothing of any photo to fit",
@@ -197,22 +178,26 @@ StageOutcome Reconstruct(RunContext* context, const JsonValue& inputs,
       *std::ranges::find(profile.effects, kViewDependence, &EffectReport::name);
   const ProgressFunction trial = parts.Next(kTrial);
   const double trial_begin = context->console->StageSeconds(), trial_cpu_begin = CpuSeconds();
-  view_dependence = resume ? EffectsOfRecord(ParseJson(measured, "checkpoint")).at(0)
-                           : ProfileViewDependence(settings, options, training_views, scene.box,
-                                                   trial, backend);
-  measured = DumpJson(EffectsRecord({view_dependence}), -1);
+  view_dependence = resumes ? EffectsOfRecord(ParseJson(hooks.note, "checkpoint")).at(0)
+                            : ProfileViewDependence(settings, &*fit, training_views, trial);
+  hooks.note = DumpJson(EffectsRecord({view_dependence}), -1);
   const double trial_seconds = context->console->StageSeconds() - trial_begin,
                trial_cpu_seconds = CpuSeconds() - trial_cpu_begin;
   context->console->Detail(EffectLine(view_dependence));
-  if (!view_dependence.on) options.sh_degree = 0;
+  if (!view_dependence.on) fit->LimitDegree(0);
   hooks.progress = parts.Next(1);
-  FitResult fit = FitField(training_views, scene.box, options, hooks, backend);
+  FittedField fitted = fit->Run(training_views, hooks);
 
-  const int64_t voxels = fit.field.geometry->num_voxels(),
-                texels = fit.field.geometry->spheres.num_texels();
+  ReconstructReport metrics;
+  metrics.device = DeviceName(backend);
+  if (settings.run.preset == "paper") {
+    const PaperChoice choice = ChoosePaperConfig(settings.run.paper_config, TraitsOf(capture));
+    metrics.paper_config = choice.name + ": " + choice.reason;
+  }
+  fit->Describe(fitted.field, &metrics);
   {
     // Freed once it is written: what is measured is the file.
-    const StoredField stored{std::move(fit.field), scene.field_from_world, scene.ndc};
+    const StoredField stored{std::move(fitted.field), scene.field_from_world, scene.ndc};
     WriteFieldFile(workspace.Path("field.npz"), stored);
   }
   StageOutcome outcome;
@@ -221,29 +206,14 @@ StageOutcome Reconstruct(RunContext* context, const JsonValue& inputs,
   WriteGains(workspace.Path("poses"), capture, profile.exposure, profile.gains);
   if (!profile.gains.of_view.empty())
     outcome.outputs.push_back(std::string("poses/") + kExposureFile);
-  ReconstructReport metrics;
-  if (!resume && view_dependence.value.value) {  // a prediction needs them apart
+  if (!resumes && view_dependence.value.value) {  // a prediction needs them apart
     metrics.trial_seconds = trial_seconds;
     metrics.trial_cpu_seconds = trial_cpu_seconds;
   }
-  metrics.device = DeviceName(backend);
-  if (settings.run.preset == "paper") {
-    const PaperChoice choice = ChoosePaperConfig(settings.run.paper_config, TraitsOf(capture));
-    metrics.paper_config = choice.name + ": " + choice.reason;
-    RunSettings used = settings;
-    used.fit = options;
-    metrics.not_to_the_letter = NotToTheLetter(choice.name, DecidedValues(used));
-  }
-  metrics.finest_grid = Finest(options);
-  metrics.rays = fit.rays;
-  metrics.sh_degree = options.sh_degree;
-  metrics.voxels = voxels;
-  if (scene.box.spheres) metrics.background_texels = texels;
-  metrics.psnr_train_db = fit.psnr_train_db;
-  metrics.rejected_voxels = fit.rejected_voxels;
-  for (const FitCurvePoint& point : fit.curve)
-    if (std::isfinite(point.psnr_train_db))
-      metrics.psnr_at_steps.emplace_back(point.step, Rounded(point.psnr_train_db));
+  metrics.rays = fitted.rays;
+  metrics.psnr_train_db = fitted.psnr_train_db;
+  metrics.rejected_voxels = fitted.rejected;
+  metrics.psnr_at_steps = std::move(fitted.psnr_at_steps);
   const StoredField stored = ReadFieldFile(workspace.Path("field.npz"));
   SetPhotoMetrics(MeasureOnPhotos(views, views.HeldOut(), stored, backend),
                   MeasureOnPhotos(views, MeasuredTrainingViews(views), stored, backend),
@@ -279,30 +249,23 @@ Stage ReconstructStage(RunContext* context) {
   const RunOptions& run = context->settings.run;
   Stage stage;
   stage.name = "reconstruct";
-  stage.inputs = JsonValue::Object{
-      {"poses", context->ResultOf("pose")},
-      {"options", OptionValues(context->settings.scene, context->settings.fit)},
-      {"seed", run.seed},
-      {"holdout", run.holdout},
-      {"effects", run.effects},
-      {"reproducible", run.reproducible}};
+  stage.inputs = JsonValue::Object{{"poses", context->ResultOf("pose")},
+                                   {"options", OptionsOfFit(context->settings)},
+                                   {"seed", run.seed},
+                                   {"holdout", run.holdout},
+                                   {"effects", run.effects},
+                                   {"reproducible", run.reproducible}};
   stage.refuse_changes = true;
   if (context->settings.start.dry_run) {
-    const WorkingViews views(ReadCapture(context->workspace->Path("poses")),
-                             context->settings.scene.photo_size, run.holdout);
+    const WorkingViews views = context->Views();
     // The box does not depend on exposures, and measuring them would read every photo.
-    const SceneProfile profile =
-        ProfileScene(views.capture(), context->settings.fit.sh_degree,
-                     run.effects + ",exposure=off", context->settings.scene.box);
-    const Backend backend = ChooseBackend(run.device, run.reproducible);
-    const int64_t pixels = PixelsToFit(views);
-    const FitOptions options =
-        AdaptOptions(context->settings.fit, {profile.scene.ndc.on(), backend == Backend::kCuda,
-                                             pixels, profile.scene.box.background.has_value()});
-    const FitPlace place{backend, pixels, profile.scene.box, run.max_memory_gb,
-                         run.reproducible};
-    stage.plan = "about " + SizeText(PlanFitAt(place, options).memory) + " of memory";
-    if (const std::string warning = MemoryWarning(options, place); !warning.empty())
+    const SceneProfile profile = ProfileScene(views.capture(), context->settings.sh_degree(),
+                                              context->settings.Effects() + ",exposure=off",
+                                              context->settings.scene.box);
+    const FitPlace place = PlaceOf(context->settings, views, profile.scene);
+    stage.plan =
+        "about " + SizeText(PlanFieldFit(context->settings, place).memory) + " of memory";
+    if (const std::string warning = MemoryWarning(context->settings, place); !warning.empty())
       stage.plan_warnings.push_back(warning);
   }
   stage.work = [context, inputs = stage.inputs](const ProgressFunction& progress) {

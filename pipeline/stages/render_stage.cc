@@ -9,11 +9,11 @@
 #include <memory>
 #include <optional>
 
+#include "kernels/render/field_renderer.h"
 #include "kernels/scene/common_camera.h"
 #include "pipeline/capture/photo_gains.h"
 #include "pipeline/capture/working_views.h"
 #include "pipeline/fields/field_file.h"
-#include "pipeline/fields/field_renderer.h"
 #include "pipeline/fields/film_timing.h"
 #include "pipeline/program/device_choice.h"
 #include "pipeline/report/stage_metrics.h"
@@ -128,7 +128,7 @@ StageOutcome Render(RunContext* context, const ProgressFunction& progress) {
   const RunSettings& settings = context->settings;
   Workspace &workspace = *context->style, &scene = *context->workspace;
   StoredField before = ReadFieldFile(scene.Path("field.npz"));
-  const WorkingViews views = context->Views().InField(before.field_from_world, before.ndc);
+  const WorkingViews views = context->Views().InField(before);
   // In NDC the field's limit is no distance.
   SeenByFewRecorder seen(views, before.ndc.on() ? 0 : before.field.near_clip);
   const FilmPath path = PathOf(views, settings.render, &before.field);
@@ -173,7 +173,8 @@ StageOutcome Render(RunContext* context, const ProgressFunction& progress) {
       PrepareFilm(settings, film_of_views, &*renderers.source, &*renderers.styled);
   renderers.fast_film = why_exact.empty();
   if (has_film)
-    context->console->Detail("renderer of the film: " + FilmRendererText(why_exact, backend));
+    context->console->Detail("renderer of the film: " +
+                             FilmRendererText(why_exact, *renderers.source));
 
   std::filesystem::remove_all(workspace.Path("frames"));
   if (!has_film)  // films of an earlier start
@@ -215,7 +216,7 @@ StageOutcome Render(RunContext* context, const ProgressFunction& progress) {
   report.path_photo_distance = path.photo_distance;
   if (has_film) report.film = {film->cameras[0].width, film->cameras[0].height};
   report.strength = settings.style.strength;
-  if (has_film) report.film_renderer = FilmRendererText(why_exact, backend);
+  if (has_film) report.film_renderer = FilmRendererText(why_exact, *renderers.source);
   if (renderers.seconds > 0) report.frames_per_second = total / renderers.seconds;
   report.seen_by_few = seen.metrics();
   const std::string few = report.seen_by_few.Sentence();

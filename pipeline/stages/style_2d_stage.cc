@@ -4,10 +4,10 @@
 
 #include "kernels/base/error.h"
 #include "kernels/image/color_statistics.h"
+#include "kernels/render/field_renderer.h"
 #include "pipeline/capture/photo_gains.h"
 #include "pipeline/capture/working_views.h"
 #include "pipeline/fields/field_file.h"
-#include "pipeline/fields/field_renderer.h"
 #include "pipeline/files/text.h"
 #include "pipeline/images/image_file.h"
 #include "pipeline/program/device_choice.h"
@@ -39,7 +39,7 @@ class MaskFiller {
       renderer_.emplace(stored_->field,
                         ChooseBackend(settings.run.device, settings.run.reproducible));
     }
-    const Camera camera = views_.InField(stored_->field_from_world, stored_->ndc).CameraOf(i);
+    const Camera camera = views_.InField(*stored_).CameraOf(i);
     FillMasked(kept, renderer_->Render(camera).color, photo);
   }
 

@@ -6,7 +6,7 @@
 #include <utility>
 
 #include "kernels/base/error.h"
-#include "pipeline/fields/field_renderer.h"
+#include "kernels/render/field_renderer.h"
 #include "pipeline/images/image_file.h"
 #include "pipeline/program/device_choice.h"
 #include "pipeline/stages/carried_edit.h"

@@ -134,7 +134,7 @@ StageOutcome Stylize(RunContext* context, const JsonValue& inputs,
   const RunSettings& settings = context->settings;
   Workspace& workspace = *context->style;
   StoredField stored = ReadFieldFile(context->workspace->Path("field.npz"));
-  const WorkingViews views = context->Views().InField(stored.field_from_world, stored.ndc);
+  const WorkingViews views = context->Views().InField(stored);
   ProgressParts parts(progress, 1 + (settings.object.On() ? kVoting : 0) +
                                     (settings.residual.On() ? kOfResidual : 0));
   const std::vector<int> indices = StyledViews(workspace, views);

@@ -14,6 +14,7 @@
 #include "kernels/field/cpu/render_view.h"
 #include "kernels/field/packed_grid.h"
 #include "kernels/field/render.h"
+#include "kernels/render/field_renderer.h"
 #include "kernels/scene/common_camera.h"
 #include "pipeline/capture/capture_store.h"
 #include "pipeline/capture/scene_profile.h"
@@ -240,12 +241,12 @@ void VariantRunner::MeasureStyle(const Variant& variant, const ProgressFunction&
   const Workspace& base = *base_->style;
   const StoredField styled = ReadStyledField(trial.workspace.folder(), trial.workspace.folder(),
                                              base_->settings.style.strength);
-  const WorkingViews views = base_->Views().InField(styled.field_from_world, styled.ndc);
-  const FastGrid grid = MakeFastGrid(styled.field);
+  const WorkingViews views = base_->Views().InField(styled);
+  const FieldRenderer renderer(styled.field, Backend::kCpu);
   const bool of_renders = fs::exists(base.Path("frames/views_2d"));
   std::vector<double> psnr;
   for (const int i : EvenlySpaced(StyledViews(base, views), kStyledViews)) {
-    RenderedView view = RenderView(grid, views.CameraOf(i), MarchOptions{styled.field.step});
+    RenderedView view = renderer.Render(views.CameraOf(i));
     if (of_renders && base_->settings.render.keep_exposure) PutGain(views.Gain(i), &view.color);
     Image target = ReadImage(
         base.Path(std::string(of_renders ? "frames/views_2d/" : "views_2d/") + FrameName(i)));
@@ -263,7 +264,7 @@ const VariantRunner::Frames& VariantRunner::BaseFrames() {
   const Workspace& base = *base_->workspace;
   f.stored = ReadFieldFile(base.Path("field.npz"));
   f.grid = MakeFastGrid(f.stored.field);
-  const WorkingViews views = base_->Views().InField(f.stored.field_from_world, f.stored.ndc);
+  const WorkingViews views = base_->Views().InField(f.stored);
   const int count = std::min(kFrames, views.count());
   // Flow is compared on frames of one size.
   const std::vector<Camera> cameras = WithCommonIntrinsics(views.Cameras());

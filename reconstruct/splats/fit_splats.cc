@@ -72,6 +72,7 @@ class SplatFitter {
     Measure();
     engine_->ReadState([&](SplatFitState* end) { result.splats = end->splats; });
     result.psnr_train_db = Psnr(tally_.tail_error, tally_.tail_values);
+    result.pixels = tally_.pixels;
     result.rejected = tally_.rejected;
     result.entries_per_step = static_cast<double>(tally_.entries) / std::max(1, options_.steps);
     result.curve = std::move(tally_.curve);
@@ -180,6 +181,7 @@ class SplatFitter {
     const SplatFitSums sums = engine_->TakeSums();
     tally_.window_error += sums.picture.squared;
     tally_.window_values += sums.picture.values;
+    tally_.pixels += sums.picture.values / 3;
     tally_.entries += sums.entries;
     tally_.rejected += sums.rejected;
   }

@@ -27,7 +27,7 @@ struct SplatCurvePoint {
 struct SplatFitTally {
   double window_error = 0, tail_error = 0;
   int64_t window_values = 0, tail_values = 0;
-  int64_t entries = 0, rejected = 0;
+  int64_t pixels = 0, entries = 0, rejected = 0;
   std::vector<SplatCurvePoint> curve;
 };
 
@@ -41,6 +41,7 @@ struct SplatFitState {
 struct SplatFitResult {
   Splats splats;
   double psnr_train_db = 0;
+  int64_t pixels = 0;  // compared, over all steps
   int64_t rejected = 0;
   double entries_per_step = 0;  // splats in tiles, which work grows with
   double seconds = 0;           // of this call, without checkpoints

@@ -4,7 +4,7 @@
 
 #include "kernels/base/error.h"
 #include "kernels/splats/cpu/render_splats.h"
-#include "reconstruct/splats/rendered_splats.h"
+#include "kernels/splats/rendered_splats.h"
 #include "reconstruct/splats/splat_engine.h"
 
 namespace regrade {

@@ -3,7 +3,7 @@
 
 #include "kernels/image/cuda/device_picture_loss.h"
 #include "kernels/splats/cuda/device_splat_update.h"
-#include "reconstruct/splats/rendered_splats.h"
+#include "kernels/splats/rendered_splats.h"
 #include "reconstruct/splats/splat_engine.h"
 
 namespace regrade {

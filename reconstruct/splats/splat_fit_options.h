@@ -14,7 +14,7 @@ namespace regrade {
 struct SplatFitOptions {
   int steps = 15000;
   float thousands = 1000;  // of splats, at most
-  int sh_degree = 3;
+  int sh_degree = 2;
   float ssim_weight = 0.2f;
   float opacity_weight = 0.03f, scale_weight = 0.03f;
   // Of Adam. That of means is over the scene's extent, and falls exponentially.

@@ -223,11 +223,40 @@ double LipschitzNetwork::SmallestK() const {
 
 std::vector<int32_t> VertexOfVoxel(const Geometry& geometry) {
   std::vector<int32_t> vertex(geometry.num_voxels(), -1);
-  if (geometry.cells.on()) std::iota(vertex.begin(), vertex.end(), 0);
+  if (geometry.cells.on() || geometry.splats.on()) std::iota(vertex.begin(), vertex.end(), 0);
   for (int64_t i = 0; i < geometry.links.size(); ++i)
     if (geometry.links[i] >= 0) vertex[geometry.links[i]] = static_cast<int32_t>(i);
   return vertex;
 }
+
+namespace {
+
+// In [-2, 2], see EQ(splat-position).
+Vec3f SplatPosition(const Geometry& geometry, int64_t splat) {
+  const GridFrame& box = geometry.frame;
+  Vec3f p;
+  float farthest = 0;
+  for (int a = 0; a < 3; ++a) {
+    p[a] = (geometry.splats.mean[3 * splat + a] - box.center[a]) / box.radius[a];
+    farthest = std::max(farthest, std::abs(p[a]));
+  }
+  return farthest <= 1 ? p : p / farthest * (2 - 1 / farthest);
+}
+
+// [-1, 1] across the box.
+Vec3f VoxelPosition(const Geometry& geometry, int32_t vertex) {
+  const Vec3i n = geometry.frame.resolution;
+  Vec3f place{0.5f, 0.5f, 0.5f};  // voxels from the box's corner
+  if (geometry.cells.on())
+    place = PlaceOf(geometry.cells.vertex_key[vertex]).Cast<float>();
+  else
+    place += Vec3i{vertex / (n.y * n.z), vertex / n.z % n.y, vertex % n.z}.Cast<float>();
+  Vec3f position;
+  for (int a = 0; a < 3; ++a) position[a] = 2 * place[a] / static_cast<float>(n[a]) - 1;
+  return position;
+}
+
+}  // namespace
 
 void FillFeatures(const RadianceField& field, float position_scale, int64_t voxel,
                   int32_t vertex, float* row) {
@@ -236,14 +265,9 @@ void FillFeatures(const RadianceField& field, float position_scale, int64_t voxe
   std::fill_n(row, kFeatureStride, 0.0f);
   for (int c = 0; c < 3; ++c) std::copy_n(sh + c * basis, basis, row + c * 9);
   const Geometry& geometry = *field.geometry;
-  const Vec3i n = geometry.frame.resolution;
-  Vec3f place{0.5f, 0.5f, 0.5f};  // voxels from the box's corner
-  if (geometry.cells.on())
-    place = PlaceOf(geometry.cells.vertex_key[vertex]).Cast<float>();
-  else
-    place += Vec3i{vertex / (n.y * n.z), vertex / n.z % n.y, vertex % n.z}.Cast<float>();
-  for (int a = 0; a < 3; ++a)
-    row[kNetworkSh + a] = position_scale * (2 * place[a] / static_cast<float>(n[a]) - 1);
+  const Vec3f position =
+      geometry.splats.on() ? SplatPosition(geometry, voxel) : VoxelPosition(geometry, vertex);
+  for (int a = 0; a < 3; ++a) row[kNetworkSh + a] = position_scale * position[a];
 }
 
 double SpatialCount(const Geometry& geometry) {

@@ -107,13 +107,15 @@ void AddBaseMap(const ColorMap& map, const T* sh, T* output) {
 }
 
 // The vertex of each voxel: the inverse of Geometry::links. Of an adaptive field, whose voxels
-// are vertices, the voxel.
+// are vertices, and of splats, the voxel.
 std::vector<int32_t> VertexOfVoxel(const Geometry& geometry);
 
 // Feature row [kFeatureStride] of a voxel; `vertex` as VertexOfVoxel has it. Coefficients of a
 // smaller basis are padded with zeros, which leaves the bound as it is. An adaptive field has
 // one frame for the positions of all levels, see EQ(cell-lattice): where two cells of different
 // levels share a vertex, it is one record, restyled once.
+// EQ(splat-position): of splats p = (mean - centre) / radius of the box, along each axis, and
+// where m = max |p_a| > 1, p (2 - 1 / m) / m: what lies far outside stays within [-2, 2].
 void FillFeatures(const RadianceField& field, float position_scale, int64_t voxel,
                   int32_t vertex, float* row);
 

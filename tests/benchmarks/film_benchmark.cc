@@ -24,8 +24,7 @@ void Compare(const std::string& folder, const std::string& style, int size, int 
   const StoredField before = ReadFieldFile(folder + "/field.npz");
   const StoredField after = ReadStyledField(folder, folder + "/styles/" + style);
   const FastGrid grid = MakeFastGrid(before.field), other = MakeFastGrid(after.field);
-  const WorkingViews views =
-      ReadWorkingViews(folder + "/poses", size, 0).InField(before.field_from_world, before.ndc);
+  const WorkingViews views = ReadWorkingViews(folder + "/poses", size, 0).InField(before);
   const std::vector<Camera> path =
       MakeCameraPath(views.Cameras(), PathOptions(), EvenMoments(frames));
   const MarchOptions exact{before.field.step}, early{before.field.step, 1e-3f};

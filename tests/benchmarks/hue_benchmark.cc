@@ -104,7 +104,7 @@ int Run(bool quick, const std::string& out, const std::vector<std::string>& styl
   source.field.appearance = PadShBasis(std::move(source.field.appearance), 9);
   const WorkingViews views =
       ReadWorkingViews(out + "/poses", static_cast<int>(options.At("photo-size").AsInt()), 0)
-          .InField(source.field_from_world, source.ndc);
+          .InField(source);
   const std::vector<Camera> cameras = views.Cameras();
   std::vector<Image> of_method, light;
   double clipped = 0, pixels = 0;

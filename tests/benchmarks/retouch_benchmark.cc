@@ -41,8 +41,7 @@ int Run(const std::string& out, const std::string& grade, const std::string& nam
   StoredField source = ReadFieldFile(out + "/field.npz");
   source.field.appearance = PadShBasis(std::move(source.field.appearance), 9);
   constexpr int kAnySize = 1 << 16;
-  const WorkingViews views = ReadWorkingViews(out + "/poses", kAnySize, 0)
-                                 .InField(source.field_from_world, source.ndc);
+  const WorkingViews views = ReadWorkingViews(out + "/poses", kAnySize, 0).InField(source);
   const std::vector<Camera> cameras = views.Cameras();
   const testing::EditTruth truth(grade, Renders(source.field, cameras), edited);
   std::vector<Image> missing = truth.graded();

@@ -6,7 +6,7 @@
 #include <memory>
 #include <string>
 
-#include "pipeline/fields/field_renderer.h"
+#include "kernels/render/field_renderer.h"
 #include "tests/support/device_test.h"
 #include "tests/support/parity_row.h"
 #include "tests/support/psnr.h"

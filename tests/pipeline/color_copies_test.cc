@@ -75,8 +75,7 @@ class ColorCopies : public testing::PictureTest {
                        "--reproducible"}),
               0);
     const StoredField stored = ReadFieldFile(out + "/field.npz");
-    const WorkingViews views =
-        ReadWorkingViews(out + "/poses", 96, 0).InField(stored.field_from_world, stored.ndc);
+    const WorkingViews views = ReadWorkingViews(out + "/poses", 96, 0).InField(stored);
     Image renders(96, 0, 3);
     for (const Camera& camera : views.Cameras()) {
       const Image render = RenderView(stored.field, camera, {stored.field.step}).color;

@@ -96,11 +96,38 @@ TEST(StageEstimate, FollowsSizesAndTheMachinesPace) {
 }
 
 TEST(Plan, TooLittleMemoryIsAWarningThatNamesTheReason) {
-  const FitOptions fit = Fit({64, 128}, {10, 10});
-  FitPlace place{.max_memory_gb = 100};
-  EXPECT_EQ(MemoryWarning(fit, place), "");
-  place.max_memory_gb = 0.001;
-  EXPECT_NE(MemoryWarning(fit, place), "");
+  RunSettings settings;
+  settings.fit = Fit({64, 128}, {10, 10});
+  for (const char* field : {"voxels", "splats"}) {
+    settings.scene.field = field;
+    FitPlace place{.pixels = 1000000, .photos = 10, .max_memory_gb = 100};
+    EXPECT_EQ(MemoryWarning(settings, place), "") << field;
+    place.max_memory_gb = 0.001;
+    EXPECT_NE(MemoryWarning(settings, place), "") << field;
+  }
+}
+
+// 40 photos of 100 x 100 pixels, 10 thousand splats of 38 floats with two moments each.
+TEST(Plan, SplatsAreLoweredToMemory) {
+  SplatFitOptions asked;
+  asked.thousands = 100, asked.sh_degree = 2, asked.steps = 100;
+  const FitPlace place{.pixels = 400000, .photos = 40};
+  EXPECT_EQ(SplatsWithinMemory(asked, place).options.thousands, 100);
+  const uint64_t memory = PlanSplatFit(asked, 400000, 40, 2).memory;
+  EXPECT_GT(memory, 100000u * 3 * 38 * 4);
+  FitPlace less = place;
+  less.max_memory_gb = 0.9e-9 * static_cast<double>(memory);
+  const PlannedSplatFit lowered = SplatsWithinMemory(asked, less);
+  EXPECT_LT(lowered.options.thousands, 100);
+  EXPECT_LE(static_cast<double>(lowered.plan.memory), less.max_memory_gb * 1e9);
+  EXPECT_NE(lowered.notice, "");
+}
+
+// A splat for each four pixels is enough.
+TEST(Plan, FewPixelsHaveFewSplats) {
+  SplatFitOptions asked;
+  asked.thousands = 100;
+  EXPECT_EQ(SplatsWithinMemory(asked, {.pixels = 200000, .photos = 4}).options.thousands, 50);
 }
 
 TEST(Plan, DeviceMemoryByHand) {

@@ -5,7 +5,7 @@
 #include <filesystem>
 #include <set>
 
-#include "pipeline/fields/field_renderer.h"
+#include "kernels/render/field_renderer.h"
 #include "pipeline/files/json_file.h"
 #include "pipeline/images/image_file.h"
 #include "tests/support/source_dir.h"

@@ -162,8 +162,7 @@ void WritePageOfRun(const std::string& folder, const std::string& run,
   constexpr int kLongest = 128;
   const MadePage made = MakePage(run, {name}, {}, {});
   const StoredField stored = ReadFieldFile(run + "/field.npz");
-  const WorkingViews photos = ReadWorkingViews(run + "/poses", kLongest, 0)
-                                  .InField(stored.field_from_world, stored.ndc);
+  const WorkingViews photos = ReadWorkingViews(run + "/poses", kLongest, 0).InField(stored);
   const PageStyle style =
       EncodeStyle(ReadNetworkFile(StyleFolder(run, name) + "/network.npz"), made.field, 1);
   RadianceField page = made.field;

@@ -140,4 +140,17 @@ SplatFrame MakeSplatFrame(const SplatsView<float>& splats, const Camera& camera,
   return frame;
 }
 
+void Recolor(const SplatsView<float>& splats, SplatFrame* frame) {
+  REGRADE_CHECK_EQ(splats.count, frame->splats.count);
+  frame->splats = splats;
+#pragma omp parallel for schedule(static)
+  for (int64_t i = 0; i < splats.count; ++i) {
+    const size_t at = static_cast<size_t>(i);
+    if (frame->box[at].empty()) continue;
+    const Splat<float> splat = splats[i];
+    frame->seen[at].color = SplatColor(splats.basis, splats.Coefficients(i),
+                                       DirectionToMean(frame->camera.center, splat.mean).unit);
+  }
+}
+
 }  // namespace regrade

@@ -34,4 +34,7 @@ void MakeSplatFrame(const SplatsView<float>& splats, const Camera& camera,
 SplatFrame MakeSplatFrame(const SplatsView<float>& splats, const Camera& camera,
                           const SplatOptions& options);
 
+// Gives the seen splats the colours of `splats`, of the same geometry.
+void Recolor(const SplatsView<float>& splats, SplatFrame* frame);
+
 }  // namespace regrade

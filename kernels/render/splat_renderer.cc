@@ -1,0 +1,97 @@
+#include "kernels/base/error.h"
+#include "kernels/render/field_renderer.h"
+#include "kernels/splats/cpu/render_splats.h"
+#include "kernels/splats/cuda/device_splat_renderer.h"
+#include "kernels/splats/rendered_splats.h"
+#include "kernels/splats/splat_field.h"
+
+namespace regrade {
+namespace {
+
+// Splats are sorted by a frame's depth and blended as they are: there is no faster picture to
+// trade for.
+class SplatRenderer : public KindRenderer {
+ public:
+  explicit SplatRenderer(const RadianceField& field)
+      : field_(field), options_(SplatOptionsOf(field_)) {}
+
+  RenderedPair RenderFastWith(const KindRenderer& other, const Camera& camera) const override {
+    return RenderWith(other, camera);
+  }
+  std::string PrepareFast() override { return ""; }
+  void ForgetFast() override {}
+  std::string FastText() const override { return "splats, as exactly as the views"; }
+
+ protected:
+  // Splats are in the world, whose rays need no device coordinates.
+  static Camera PinholeOf(Camera camera) {
+    REGRADE_CHECK(camera.lens == LensModel::kPinhole);
+    camera.ndc = {};
+    return camera;
+  }
+
+  RadianceField field_;  // on a device without colours
+  SplatOptions options_;
+};
+
+class CpuSplatRenderer : public SplatRenderer {
+ public:
+  using SplatRenderer::SplatRenderer;
+
+  RenderedView Render(const Camera& camera) const override {
+    return RenderedSplats(RenderSplats(FrameOf(camera)));
+  }
+
+  RenderedPair RenderWith(const KindRenderer& other, const Camera& camera) const override {
+    const auto& same = dynamic_cast<const CpuSplatRenderer&>(other);
+    SplatFrame frame = FrameOf(camera);
+    RenderedPair pair{RenderedSplats(RenderSplats(frame)), {}};
+    Recolor(SplatsOf(same.field_), &frame);
+    pair.other_color = RenderedSplats(RenderSplats(frame)).color;
+    return pair;
+  }
+
+ private:
+  SplatFrame FrameOf(const Camera& camera) const {
+    return MakeSplatFrame(SplatsOf(field_), PinholeOf(camera), options_);
+  }
+};
+
+class CudaSplatRenderer : public SplatRenderer {
+ public:
+  explicit CudaSplatRenderer(const RadianceField& field) : SplatRenderer(field) {
+    const SplatsView<float> splats = SplatsOf(field);
+    const int64_t n = splats.count;
+    device_ = DeviceSplats(n, splats.basis);
+    device_.count = n;
+    device_.background = splats.background;
+    device_.mean.CopyIn(splats.mean, 3 * n);
+    device_.log_scale.CopyIn(splats.log_scale, 3 * n);
+    device_.quaternion.CopyIn(splats.quaternion, 4 * n);
+    device_.opacity_logit.CopyIn(splats.opacity_logit, n);
+    device_.sh.CopyIn(splats.sh, 3 * splats.basis * n);
+    field_ = {};
+  }
+
+  RenderedView Render(const Camera& camera) const override {
+    renderer_.Render(device_.view(), PinholeOf(camera), options_);
+    return RenderedSplats(renderer_.Download());
+  }
+
+  RenderedPair RenderWith(const KindRenderer& other, const Camera& camera) const override {
+    return {Render(camera), dynamic_cast<const CudaSplatRenderer&>(other).Render(camera).color};
+  }
+
+ private:
+  DeviceSplats device_;
+  mutable DeviceSplatRenderer renderer_;  // its memory is kept between frames
+};
+
+}  // namespace
+
+std::unique_ptr<KindRenderer> MakeSplatRenderer(const RadianceField& field, Backend backend) {
+  if (backend == Backend::kCuda) return std::make_unique<CudaSplatRenderer>(field);
+  return std::make_unique<CpuSplatRenderer>(field);
+}
+
+}  // namespace regrade
