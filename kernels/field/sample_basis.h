@@ -12,10 +12,10 @@ template <typename T>
 class SampleBasis {
  public:
   // `weights` must outlive it.
-  SampleBasis(int basis, const Vec3f& ray_direction, const RayWeights& weights)
+  SampleBasis(int basis, const Vec3<T>& ray_direction, const RayWeights& weights)
       : basis_(basis),
         directions_(weights.directions.empty() ? nullptr : weights.directions.data()) {
-    if (directions_ == nullptr) ShBasis(basis, ray_direction.Cast<T>(), gamma_);
+    if (directions_ == nullptr) ShBasis(basis, ray_direction, gamma_);
   }
 
   // [kMaxBasis], of sample i of all rays; valid until the next call.

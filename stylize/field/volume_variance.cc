@@ -50,7 +50,7 @@ class Observer {
   Seen Look(const Vec3f& direction, const RayWeights& weights, int64_t ray) const {
     Seen seen;
     seen.direction = direction;
-    SampleBasis<double> basis(basis_, direction, weights);
+    SampleBasis<double> basis(basis_, direction.Cast<double>(), weights);
     const double left = weights.transmittance[ray];
     seen.source = source_.background.Cast<double>() * left;
     seen.styled = styled_.background.Cast<double>() * left;
