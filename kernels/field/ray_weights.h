@@ -15,15 +15,18 @@ namespace regrade {
 // A sample of the box, or of a background sphere if `vertex` is negative; or a splat.
 struct WeightedSample {
   int32_t vertex;  // lowest corner of the sample's cell, linear index into links; of an
-                   // adaptive field the cell; a splat; of a sphere ~((x R + y) L + layer), see TexelCell
-  Vec3f fraction;  // trilinear fractions within the cell; bilinear, z = 0, on a sphere; 0 of splats
+                   // adaptive field the cell; a splat; of a sphere ~((x R + y) L + layer), see
+                   // TexelCell
+  Vec3f fraction;  // trilinear fractions within the cell; bilinear, z = 0, on a sphere; 0 of
+                   // splats
   float weight;    // w_i of EQ(composite)
 
   bool on_sphere() const { return vertex < 0; }
 };
 
 // The points a sample blends with CornerWeight(fraction, k), k = 0..7. Points number the voxels
-// first and then the texels of the spheres; -1 if nothing is stored. A splat is one point, k = 0.
+// first and then the texels of the spheres; -1 if nothing is stored. A splat is one point, k =
+// 0.
 void CornerPoints(const Geometry& geometry, const WeightedSample& sample, int32_t* point);
 
 // Lists for a batch of rays, concatenated in the rays' order.

@@ -6,7 +6,7 @@
 
 namespace regrade {
 
-// Gamma(d) of EQ(sh-basis): d is the ray's direction, of splats each sample's own. Harmonics
+// Gamma(d), see EQ(sh-basis): d is the ray's direction, of splats each sample's own. Harmonics
 // beyond `basis` are 0.
 template <typename T>
 class SampleBasis {

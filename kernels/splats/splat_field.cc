@@ -69,7 +69,8 @@ RadianceField FieldOfSplats(const Splats& splats, const GridFrame& frame, float 
   auto geometry = std::make_shared<Geometry>();
   geometry->frame = frame;
   geometry->splats = {ToBuffer(splats.mean), ToBuffer(splats.log_scale),
-                      UnitQuaternions(splats.quaternion), ToBuffer(splats.opacity_logit), antialiased};
+                      UnitQuaternions(splats.quaternion), ToBuffer(splats.opacity_logit),
+                      antialiased};
   RadianceField field;
   field.geometry = std::move(geometry);
   field.appearance.basis = splats.basis;

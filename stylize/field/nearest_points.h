@@ -8,9 +8,9 @@
 
 namespace regrade {
 
-// [points, count]: of each point `count` others, nearest first, of equally near ones that of the
-// lower index; -1 where there are no more. Exact, by a k-d tree; coordinates are finite. The
-// same for any number of threads.
+// [points, count]: of each point `count` others, nearest first, of equally near ones that of
+// the lower index; -1 where there are no more. Exact, by a k-d tree; coordinates are finite.
+// The same for any number of threads.
 std::vector<int32_t> NearestPoints(const std::vector<Vec3f>& points, int count);
 
 }  // namespace regrade

@@ -225,8 +225,8 @@ void Add(double source, double styled, double k, VarianceGroup* group) {
 }  // namespace
 
 VarianceReport MeasureVariance(const RadianceField& source, const RadianceField& styled,
-                               const LipschitzNetwork& network,
-                               const RayPairs& pairs, const MarchOptions& march,
+                               const LipschitzNetwork& network, const RayPairs& pairs,
+                               const MarchOptions& march,
                                const std::vector<float>* object_weights) {
   if (object_weights != nullptr)
     REGRADE_CHECK_EQ(std::ssize(*object_weights), source.geometry->num_voxels());

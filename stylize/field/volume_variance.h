@@ -64,8 +64,8 @@ inline constexpr double kTransparentTransmittance = 1e-2;  // more than that is 
 // MixFields with them. Colours are as rendered, but not clipped to [0, 1]. Sums in double; the
 // result does not depend on the number of threads.
 VarianceReport MeasureVariance(const RadianceField& source, const RadianceField& styled,
-                               const LipschitzNetwork& network,
-                               const RayPairs& pairs, const MarchOptions& march,
+                               const LipschitzNetwork& network, const RayPairs& pairs,
+                               const MarchOptions& march,
                                const std::vector<float>* object_weights = nullptr);
 
 }  // namespace regrade

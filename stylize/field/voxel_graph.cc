@@ -14,8 +14,8 @@ namespace {
 constexpr float kWidth = 0.2f;  // of colour, in units of white: s of EQ(voxel-residual)
 constexpr float kLeast = 0.1f;  // what voxels of different colours still tell each other
 constexpr int kLevels = 6;
-constexpr int kNearest = 6;           // splats
-constexpr float kPlacesAcross = 64;   // of the box, for cubes of splats
+constexpr int kNearest = 6;          // splats
+constexpr float kPlacesAcross = 64;  // of the box, for cubes of splats
 
 void KeepEachOnce(std::vector<std::array<int32_t, 2>>* edges) {
   std::sort(edges->begin(), edges->end());
@@ -43,7 +43,7 @@ void AddSplatEdges(const std::vector<Vec3f>& positions,
   KeepEachOnce(edges);
 }
 
-// EQ(splat-position), in the box's proportions: within [-2, 2].
+// See EQ(splat-position); in the box's proportions: within [-2, 2].
 std::vector<Vec3f> SplatPositions(const RadianceField& field) {
   const Vec3f& radius = field.geometry->frame.radius;
   const float longest = std::max({radius.x, radius.y, radius.z});

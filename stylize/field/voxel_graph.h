@@ -24,7 +24,8 @@ struct VoxelGraph {
 
 // Neighbours are the stored ends of a cell's twelve edges; of a uniform grid that is the next
 // voxel along each axis; of splats, which have no lattice, the six whose means are nearest, in
-// the positions of EQ(splat-position), from either side. Texels of background spheres are no voxels.
+// the positions of FillFeatures, from either side. Texels of background spheres are no
+// voxels.
 VoxelGraph GraphOf(const RadianceField& field);
 
 }  // namespace regrade

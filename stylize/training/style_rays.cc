@@ -59,8 +59,8 @@ size_t InRandomOrder(size_t n, size_t place, uint64_t seed, uint64_t order) {
 StyleRays WholeViewRays(const std::vector<StyledTrainingView>& views, bool passes,
                         uint64_t seed, uint64_t step) {
   const size_t n = views.size();
-  const size_t index = passes ? InRandomOrder(n, step % n, seed, step / n)
-                              : RandomIndex(seed, step, 0, n);
+  const size_t index =
+      passes ? InRandomOrder(n, step % n, seed, step / n) : RandomIndex(seed, step, 0, n);
   const Part part = PartOf(views[index]);
   StyleRays batch = BatchOf(views);
   AddPatch(views, index, part.x0, part.y0, part.width, part.height, &batch);

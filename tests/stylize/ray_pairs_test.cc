@@ -40,7 +40,8 @@ TEST(RayPairs, BothRaysEndAtOnePoint) {
     const Vec3d a = EndOf(ball, pairs.rays[i]), b = EndOf(ball, pairs.rays[i + 1]);
     // 1 % of a depth of at most 2.2, along the ray; a hidden point would be up to 1.5 apart
     EXPECT_LT(Norm(a - b), 0.03);
-    EXPECT_GT(Norm(pairs.rays[i].origin - pairs.rays[i + 1].origin), 1);  // they are of two views
+    EXPECT_GT(Norm(pairs.rays[i].origin - pairs.rays[i + 1].origin),
+              1);  // they are of two views
   }
 }
 
@@ -134,8 +135,7 @@ TEST(VolumeVariance, PairsOnSpheresAreAGroupAndDifferAsRendered) {
 TEST(VolumeVariance, PixelsOfOnePointStayBelowTheBound) {
   Surrounded scene;
   scene.Style();
-  const RayPairs pairs =
-      PixelsOfOnePoint(scene.source, scene.cameras, 2000, 3, MarchOptions{});
+  const RayPairs pairs = PixelsOfOnePoint(scene.source, scene.cameras, 2000, 3, MarchOptions{});
   const VarianceReport report =
       MeasureVariance(scene.source, scene.styled, scene.network, pairs, MarchOptions{});
   EXPECT_GT(report.valid.pairs, 500);

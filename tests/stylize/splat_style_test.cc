@@ -5,8 +5,8 @@
 #include "stylize/field/coefficient_fit.h"
 #include "stylize/field/object_weights.h"
 #include "stylize/field/ray_pairs.h"
-#include "stylize/field/voxel_residual.h"
 #include "stylize/field/volume_variance.h"
+#include "stylize/field/voxel_residual.h"
 #include "stylize/training/restyle_field.h"
 #include "tests/support/algorithm1.h"
 #include "tests/support/expect_error.h"
@@ -71,10 +71,10 @@ TEST(SplatStyle, GradientAgainstRichardson) {
       const double h0 = central(0x1p-8f), h1 = central(0x1p-9f), h2 = central(0x1p-10f);
       const double r0 = (4 * h1 - h0) / 3, r1 = (4 * h2 - h1) / 3;
       const double numeric = (16 * r1 - r0) / 15, is = analytic[static_cast<size_t>(at)];
-      EXPECT_NEAR(is, numeric,
-                  RecordDigits("gradient of splats through sigma, W, b and K",
-                               Computed::kDouble, is - numeric, 2e-8,
-                               std::max(1.0, std::abs(numeric))))
+      EXPECT_NEAR(
+          is, numeric,
+          RecordDigits("gradient of splats through sigma, W, b and K", Computed::kDouble,
+                       is - numeric, 2e-8, std::max(1.0, std::abs(numeric))))
           << "layer " << l;
     }
   }
@@ -106,8 +106,8 @@ TEST(SplatStyle, ThreadsDoNotChangeABit) {
     const Threads threads(t == 0 ? 1 : 5);
     GradientAggregation(field, {}).Run(network, batch, &gradient[t]);
   }
-  EXPECT_TRUE(RecordSameBits("splats, 1 and 5 threads", Computed::kFloat,
-                             gradient[0] == gradient[1]));
+  EXPECT_TRUE(
+      RecordSameBits("splats, 1 and 5 threads", Computed::kFloat, gradient[0] == gradient[1]));
 }
 
 // --- training
@@ -160,9 +160,9 @@ TEST(SplatStyle, TrainingBeatsTheLinearMap) {
     const Image shown = renderer.Render(ball.views[v].camera).color;
     for (size_t i = 0; i < shown.pixels.size(); ++i) {
       if (ball.masks[v].pixels[i / 3] < 0.5f) continue;
-      sum += std::pow(double{shown.pixels[i]} -
-                          double{std::clamp(ball.targets[v].pixels[i], 0.0f, 1.0f)},
-                      2);
+      sum += std::pow(
+          double{shown.pixels[i]} - double{std::clamp(ball.targets[v].pixels[i], 0.0f, 1.0f)},
+          2);
       ++count;
     }
   }
@@ -257,13 +257,15 @@ struct Edited {
     RadianceField edited = field;
     for (int64_t v = 0; v < field.geometry->num_voxels(); ++v)
       for (int c = 0; c < 3; ++c)
-        if (field.geometry->splats.mean[3 * v] > 0) edited.appearance.sh[27 * v + 9 * c] += 0.5f;
+        if (field.geometry->splats.mean[3 * v] > 0)
+          edited.appearance.sh[27 * v + 9 * c] += 0.5f;
     const FieldRenderer before(field, Backend::kCpu), after(edited, Backend::kCpu);
     for (const Camera& camera : cameras) {
       wanted.push_back(after.Render(camera).color);
       missing.push_back(wanted.back());
       const Image shown = before.Render(camera).color;
-      for (size_t i = 0; i < shown.pixels.size(); ++i) missing.back().pixels[i] -= shown.pixels[i];
+      for (size_t i = 0; i < shown.pixels.size(); ++i)
+        missing.back().pixels[i] -= shown.pixels[i];
     }
   }
 };
@@ -274,7 +276,9 @@ TEST(SplatStyle, AResidualShowsAnEdit) {
   const int64_t n = scene.field.geometry->num_voxels();
   EXPECT_EQ(graph.voxels, n);
   for (int64_t v = 0; v < n; ++v)
-    EXPECT_GE(graph.first_edge[static_cast<size_t>(v) + 1] - graph.first_edge[static_cast<size_t>(v)], 6);
+    EXPECT_GE(
+        graph.first_edge[static_cast<size_t>(v) + 1] - graph.first_edge[static_cast<size_t>(v)],
+        6);
   EXPECT_LT(std::ssize(graph.edges), 5 * n);
   ResidualRays rays;
   for (size_t v = 0; v < scene.cameras.size(); ++v)
@@ -313,7 +317,8 @@ TEST(SplatStyle, CoefficientsFitOtherPictures) {
     wanted.push_back(after.Render(camera).color);
     missing.push_back(wanted.back());
     const Image shown = before.Render(camera).color;
-    for (size_t i = 0; i < shown.pixels.size(); ++i) missing.back().pixels[i] -= shown.pixels[i];
+    for (size_t i = 0; i < shown.pixels.size(); ++i)
+      missing.back().pixels[i] -= shown.pixels[i];
   }
   const auto fit = [&](int threads) {
     const Threads some(threads);

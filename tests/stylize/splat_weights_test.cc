@@ -44,8 +44,8 @@ TEST(SplatWeights, AreThoseOfThePlainPicture) {
       }
   }
   EXPECT_GT(most, 8);
-  EXPECT_LE(largest, RecordDigits("sum of weights and transmittance", Computed::kFloat, largest,
-                                  1e-5));
+  EXPECT_LE(largest,
+            RecordDigits("sum of weights and transmittance", Computed::kFloat, largest, 1e-5));
 }
 
 TEST(SplatWeights, ColorsAreTheRenderers) {
@@ -72,8 +72,9 @@ TEST(SplatWeights, ColorsAreTheRenderers) {
         }
       }
       for (int c = 0; c < 3; ++c)
-        largest = std::max(largest, std::abs(double{std::clamp(color[c], 0.0f, 1.0f)} -
-                                             double{picture.pixels[static_cast<size_t>(3 * i + c)]}));
+        largest =
+            std::max(largest, std::abs(double{std::clamp(color[c], 0.0f, 1.0f)} -
+                                       double{picture.pixels[static_cast<size_t>(3 * i + c)]}));
     }
   }
   EXPECT_LE(largest, RecordDigits("colours from weights", Computed::kFloat, largest, 2e-5));

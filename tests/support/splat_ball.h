@@ -29,11 +29,11 @@ inline RadianceField SplatBall(int64_t count, float contrast = 1, int basis = 9)
     for (int c = 0; c < 3; ++c)
       for (int k = 0; k < basis; ++k)
         splats.sh[static_cast<size_t>(3 * basis * i + basis * c + k)] =
-            contrast *
-            (k == 0 ? 1.5f * std::sin(3 * p.x + 2 * static_cast<float>(c)) *
-                          std::cos(4 * p.y - p.z + static_cast<float>(c))
-                    : 0.1f * static_cast<float>(
-                                 Draw(75, item, static_cast<uint64_t>(9 * c + k), -1, 1)));
+            contrast * (k == 0
+                            ? 1.5f * std::sin(3 * p.x + 2 * static_cast<float>(c)) *
+                                  std::cos(4 * p.y - p.z + static_cast<float>(c))
+                            : 0.1f * static_cast<float>(Draw(
+                                         75, item, static_cast<uint64_t>(9 * c + k), -1, 1)));
   }
   splats.background = {0.2f, 0.3f, 0.1f};
   return FieldOfSplats(splats, GridFrame{}, 0.2f, false);
