@@ -42,14 +42,10 @@ SplatOptions SplatOptionsFor(float near_clip, const Vec3f& radius, bool antialia
 SplatsView<float> SplatsOf(const RadianceField& field) {
   const SplatGeometry& splats = field.geometry->splats;
   REGRADE_CHECK(splats.on());
-  return {splats.mean.data(),
-          splats.log_scale.data(),
-          splats.quaternion.data(),
-          splats.opacity_logit.data(),
-          field.appearance.sh.data(),
-          splats.opacity_logit.size(),
-          field.appearance.basis,
-          field.background};
+  return {splats.mean.data(),         splats.log_scale.data(),
+          splats.quaternion.data(),   splats.opacity_logit.data(),
+          field.appearance.sh.data(), splats.opacity_logit.size(),
+          field.appearance.basis,     field.background};
 }
 
 SplatOptions SplatOptionsOf(const RadianceField& field) {
@@ -62,7 +58,8 @@ RadianceField FieldOfSplats(const Splats& splats, const GridFrame& frame, float 
   auto geometry = std::make_shared<Geometry>();
   geometry->frame = frame;
   geometry->splats = {ToBuffer(splats.mean), ToBuffer(splats.log_scale),
-                      UnitQuaternions(splats.quaternion), ToBuffer(splats.opacity_logit), antialiased};
+                      UnitQuaternions(splats.quaternion), ToBuffer(splats.opacity_logit),
+                      antialiased};
   RadianceField field;
   field.geometry = std::move(geometry);
   field.appearance.basis = splats.basis;
