@@ -1,16 +1,20 @@
 // Splats as a field: rendered, stored, checkpointed, and the photos that they are fitted to.
+#include "kernels/splats/splat_field.h"
+
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cstring>
 
 #include "kernels/base/half.h"
 #include "kernels/image/undistort_photo.h"
 #include "kernels/render/field_renderer.h"
+#include "kernels/splats/covariance.h"
 #include "kernels/splats/rendered_splats.h"
-#include "kernels/splats/splat_field.h"
 #include "pipeline/capture/working_views.h"
 #include "pipeline/fields/field_file.h"
 #include "pipeline/fields/splat_checkpoint.h"
+#include "pipeline/fields/splat_ply.h"
 #include "pipeline/images/still_file.h"
 #include "pipeline/stages/field_fit.h"
 #include "tests/support/expect_error.h"
@@ -71,8 +75,8 @@ TEST(SplatField, AFileKeepsMeansAndRoundsTheRestToHalves) {
     const SplatGeometry &a = in.field.geometry->splats, &b = out.field.geometry->splats;
     ASSERT_TRUE(a.on());
     EXPECT_TRUE(Same(a.mean, b.mean));
-    for (const auto member : {&SplatGeometry::log_scale, &SplatGeometry::quaternion,
-                              &SplatGeometry::opacity_logit})
+    for (const auto member :
+         {&SplatGeometry::log_scale, &SplatGeometry::quaternion, &SplatGeometry::opacity_logit})
       for (int64_t i = 0; i < (b.*member).size(); ++i)
         ASSERT_EQ((a.*member)[i], FloatFromHalf(HalfFromFloat((b.*member)[i])));
     EXPECT_EQ(in.field.appearance.basis, basis);
@@ -80,8 +84,7 @@ TEST(SplatField, AFileKeepsMeansAndRoundsTheRestToHalves) {
     EXPECT_EQ(in.field.geometry->frame.radius, kBox.radius);
     EXPECT_EQ(in.field_from_world.scale, 3);
     WriteFieldFile(folder / "again.npz", in);
-    EXPECT_EQ(testing::ReadText(folder / "again.npz"),
-              testing::ReadText(folder / "field.npz"));
+    EXPECT_EQ(testing::ReadText(folder / "again.npz"), testing::ReadText(folder / "field.npz"));
   }
 }
 
@@ -112,6 +115,48 @@ TEST(SplatCheckpoint, AStateComesBackBitForBit) {
   EXPECT_EQ(back->second_moment.sh, state.second_moment.sh);
   for (const size_t size : {size_t{0}, size_t{3}, bytes.size() / 2, bytes.size() - 1})
     EXPECT_FALSE(UnpackSplatFitState(std::string_view(bytes).substr(0, size), &note)) << size;
+}
+
+// The file's floats, read by their places, rendered by the same camera in the capture's world.
+TEST(SplatPly, IsThePictureInTheCapturesWorld) {
+  const TemporaryFolder folder;
+  StoredField stored{SmallSplatField(80, 9), {}, {}};
+  const double turn[4] = {0.8, 0.1, -0.5, 0.3};
+  stored.field_from_world = {2.5, RotationOf(turn), {0.3, -0.2, 0.7}};
+  WriteSplatPly(folder / "field.ply", stored, "a comment");
+  const std::string file = testing::ReadText(folder / "field.ply");
+  const size_t begin = file.find("end_header\n") + 11;
+  EXPECT_NE(file.find("element vertex 80\n"), std::string::npos);
+  constexpr size_t kFloats = 3 + 3 + 27 + 1 + 3 + 4;
+  ASSERT_EQ(file.size() - begin, 80 * kFloats * sizeof(float));
+  Splats splats(80, 9);
+  for (size_t i = 0; i < 80; ++i) {
+    float row[kFloats];
+    std::memcpy(row, file.data() + begin + i * sizeof row, sizeof row);
+    Splat<float> splat;
+    splat.mean = {row[0], row[1], row[2]};
+    splat.opacity_logit = row[33];
+    splat.log_scale = {row[34], row[35], row[36]};
+    std::copy_n(row + 37, 4, splat.quaternion);
+    splats.Set(static_cast<int64_t>(i), splat);
+    for (size_t c = 0; c < 3; ++c) {
+      splats.sh[(3 * i + c) * 9] = row[6 + c];
+      std::copy_n(row + 9 + 8 * c, 8, &splats.sh[(3 * i + c) * 9 + 1]);
+    }
+  }
+  splats.background = stored.field.background;
+  Camera in_world = SplatCameraOf(61, 43);
+  in_world.camera_from_world.translation = in_world.camera_from_world.translation * 0.4;
+  const Camera in_field = in_world.Transformed(stored.field_from_world);
+  const SplatOptions options = SplatOptionsOf(stored.field);
+  SplatOptions world_options = options;
+  world_options.near_plane /= 2.5;
+  const auto a = RenderSplatsPlain(SplatsOf(stored.field), in_field, options),
+             b = RenderSplatsPlain(splats.view(), in_world, world_options);
+  double darkest = 1;
+  for (size_t p = 0; p < a.color.size(); ++p) ASSERT_NEAR(a.color[p], b.color[p], 1e-4) << p;
+  for (const float t : a.transmittance) darkest = std::min(darkest, double{t});
+  EXPECT_LT(darkest, 0.5);  // the camera sees splats
 }
 
 // A lens bends the photo's edges: what the undistorted photo does not show is masked.
