@@ -14,6 +14,7 @@
 #include "pipeline/capture/working_views.h"
 #include "pipeline/commands/command.h"
 #include "pipeline/fields/field_file.h"
+#include "pipeline/fields/splat_ply.h"
 #include "pipeline/fields/surface_points.h"
 #include "pipeline/fields/uniform_field.h"
 #include "pipeline/files/atomic_file.h"
@@ -46,9 +47,10 @@ struct ExportOptions {
          {.help =
               "colmap-text and colmap write images/ and sparse/; transforms writes images/ "
               "and transforms.json for nerfstudio and instant-ngp; svox2 writes field.npz and "
-              "each style's NAME.npz on uniform grids; ply writes points with colours, "
-              "approximately on the surfaces, to field.ply and NAME.ply; cube writes one style "
-              "as a LUT for photo and video editors, to the file --out",
+              "each style's NAME.npz on uniform grids; ply writes field.ply and each style's "
+              "NAME.ply: splats as viewers and editors of splats open them, of voxels points "
+              "with colours, approximately on the surfaces; cube writes one style as a LUT for "
+              "photo and video editors, to the file --out",
           .choices = "colmap-text|colmap|transforms|svox2|ply|cube"});
     bind("name", name, {.help = "of cube: the style; by default the last one"});
     bind("resolution", resolution,
@@ -161,6 +163,13 @@ void ExportField(const ExportOptions& options, const std::string& folder,
   console->Info("wrote " + to + text);
 }
 
+void ExportSplats(const ExportOptions& options, const std::string& name,
+                  const StoredField& stored, Console* console) {
+  const std::string to = options.out + "/" + name + ".ply";
+  WriteSplatPly(to, stored, "splats by regrade, in the world of the photos' poses");
+  console->Info(Concat("wrote ", to, ": ", stored.field.geometry->num_voxels(), " splats"));
+}
+
 void ExportPoints(const ExportOptions& options, const std::string& folder,
                   const std::string& name, const StoredField& stored, Console* console) {
   constexpr int kViews = 60, kResolution = 512;
@@ -186,14 +195,20 @@ void ExportFields(const ExportOptions& options, const std::string& folder, Conso
     return;
   }
   CheckResults(folder, styles);
+  StoredField field = ReadFieldFile(folder + "/field.npz");
+  if (options.format == "svox2" && field.field.geometry->splats.on())
+    throw UsageError("svox2 reads voxels, and this field has splats", "--format svox2",
+                     "use --format ply, or fit the scene with --field voxels");
   MakeEmptyFolder(options.out, "");
   const auto write = [&](const std::string& name, StoredField stored) {
-    if (options.format == "ply")
+    if (stored.field.geometry->splats.on())
+      ExportSplats(options, name, stored, console);
+    else if (options.format == "ply")
       ExportPoints(options, folder, name, stored, console);
     else
       ExportField(options, folder, name, std::move(stored), console);
   };
-  write("field", ReadFieldFile(folder + "/field.npz"));
+  write("field", std::move(field));
   for (const std::string& style : styles)
     write(style == "field" ? "field-style" : style,
           ReadStyledField(folder, StyleFolder(folder, style)));

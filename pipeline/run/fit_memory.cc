@@ -40,7 +40,7 @@ StagePlan PlanSplatsAt(const FitPlace& place, const SplatFitOptions& options) {
 }
 
 SplatFitOptions AtMostOfPixels(SplatFitOptions options, const FitPlace& place) {
-  const float most = 1e-3f * static_cast<float>(place.pixels / kPixelsOfSplat);
+  const float most = static_cast<float>(place.pixels / kPixelsOfSplat) / 1000;
   options.thousands =
       std::clamp(most, std::min(kLeastSplats, options.thousands), options.thousands);
   return options;

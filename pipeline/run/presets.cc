@@ -31,6 +31,25 @@ const FitEffort kFitEfforts[] = {
     {"best", true, {48, 96, 192, 384, 768, 1536}, {2000, 2000, 2400, 2400, 3600, 6000}, 20},
 };
 
+struct SplatEffort {
+  const char* preset;
+  bool on_card;
+  int steps;
+  float thousands;  // of splats, at most
+};
+
+const SplatEffort kSplatEfforts[] = {
+    {"smoke", false, 150, 5},      {"draft", false, 1300, 40},  {"standard", false, 2500, 100},
+    {"best", false, 4000, 250},    {"smoke", true, 300, 10},    {"draft", true, 4000, 200},
+    {"standard", true, 8000, 500}, {"best", true, 15000, 1000},
+};
+
+void UseSplatEffort(const std::string& preset, bool on_card, SplatFitOptions* splats) {
+  for (const SplatEffort& effort : kSplatEfforts)
+    if (effort.preset == preset && effort.on_card == on_card)
+      splats->steps = effort.steps, splats->thousands = effort.thousands;
+}
+
 void UseFitEffort(const std::string& preset, bool on_card, FitOptions* fit) {
   const auto found = std::ranges::find_if(kFitEfforts, [&](const FitEffort& effort) {
     return effort.preset == preset && effort.on_card == on_card;
@@ -54,6 +73,7 @@ void ApplyPreset(const std::string& preset, bool on_card, RunSettings* settings)
   settings->run.preset = preset;
   ApplyStyleRecipe(preset == "paper" ? "paper" : "standard", &settings->network);
   UseFitEffort(preset, on_card, &settings->fit);
+  UseSplatEffort(preset, on_card, &settings->splats);
   // Views between the photos see cells of little weight in all of them (COSTS.md).
   settings->fit.prune_last = preset != "best";
   if (preset == "smoke") {

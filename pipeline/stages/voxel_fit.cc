@@ -16,7 +16,8 @@ class VoxelFit : public FieldFit {
   VoxelFit(const RunSettings& settings, const FitPlace& place)
       : settings_(settings), place_(place), options_(AdaptedTo(settings.fit, place)) {
     options_.seed = settings.run.seed;
-    if (settings.run.reproducible && options_.shards == 0) options_.shards = kReproducibleShards;
+    if (settings.run.reproducible && options_.shards == 0)
+      options_.shards = kReproducibleShards;
   }
 
   std::vector<std::string> FitIntoMemory() override {
@@ -53,8 +54,8 @@ class VoxelFit : public FieldFit {
       };
     hooks.resume = resume_ ? &*resume_ : nullptr;
     FitResult fit = FitField(views, place_.box, options_, hooks, place_.backend);
-    FittedField fitted{std::move(fit.field), fit.psnr_train_db, {}, fit.rays,
-                       fit.rejected_voxels};
+    FittedField fitted{
+        std::move(fit.field), fit.psnr_train_db, {}, fit.rays, fit.rejected_voxels};
     for (const FitCurvePoint& point : fit.curve)
       if (std::isfinite(point.psnr_train_db))
         fitted.psnr_at_steps.emplace_back(point.step, RoundedForChart(point.psnr_train_db));

@@ -7,6 +7,8 @@
 #include <vector>
 
 #include "kernels/base/random.h"
+#include "kernels/splats/covariance.h"
+#include "kernels/splats/rotate_harmonics.h"
 #include "tests/support/derivative.h"
 #include "tests/support/record_error.h"
 
@@ -126,6 +128,24 @@ TEST(SplatColor, FarCamerasKeepTheDigitsOfDirections) {
       ASSERT_NEAR(got[a], exact[a],
                   testing::RecordDigits("direction", testing::Computed::kFloat,
                                         got[a] - exact[a], 6e-8));
+  }
+}
+
+TEST(RotateHarmonics, ATurnedFunctionIsTheFunctionOfTurnedDirections) {
+  const double quaternion[4] = {0.3, -0.7, 0.5, 0.2};
+  const Mat3d turn = RotationOf(quaternion);
+  const HarmonicsMatrix matrix = RotateHarmonics(turn);
+  for (uint64_t i = 0; i < 20; ++i) {
+    const Vec3d direction = RandomDirection(i);
+    double turned[16], own[16];
+    ShBasisTo3(16, turn * direction, turned);
+    ShBasisTo3(16, direction, own);
+    // Row by row: Gamma_j(R^T d) = sum_i M_ij Gamma_i(d), at d = R direction.
+    for (size_t j = 0; j < 16; ++j) {
+      double sum = 0;
+      for (size_t k = 0; k < 16; ++k) sum += matrix[k][j] * turned[k];
+      EXPECT_NEAR(sum, own[j], 1e-13) << j;
+    }
   }
 }
 

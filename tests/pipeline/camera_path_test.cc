@@ -7,6 +7,7 @@
 #include <cmath>
 #include <memory>
 
+#include "kernels/splats/splat_field.h"
 #include "pipeline/fields/film_timing.h"
 #include "pipeline/fields/path_clearance.h"
 
@@ -108,9 +109,8 @@ TEST(CameraPath, BeginsAndEndsAtRestWithoutJumps) {
     EXPECT_LT(std::abs(steps[i] - steps[i - 1]), 0.1 * most) << i;  // nor does speed jump
 }
 
-// Two walls of photos' places with a slab between them: a wide mean cuts the corner through it.
-TEST(PathClearance, FindsAPathThroughASurface) {
-  RadianceField field;
+// A slab of voxels, 100 per unit of length: e^-19 through 3 / 16.
+RadianceField WallOfVoxels() {
   auto geometry = std::make_shared<Geometry>();
   constexpr int kN = 32;
   geometry->frame = {{kN, kN, kN}, {0, 0, 0}, {1, 1, 1}};
@@ -120,8 +120,29 @@ TEST(PathClearance, FindsAPathThroughASurface) {
       for (int z = 0; z < kN; ++z)
         geometry->links[geometry->frame.Vertex(x, y, z)] = std::abs(x - kN / 2) < 2 ? 0 : -1;
   geometry->density.Resize(1);
-  geometry->density[0] = 100;  // per unit of length: e^-19 through the slab of 3 / 16
+  geometry->density[0] = 100;
+  RadianceField field;
   field.geometry = geometry;
+  return field;
+}
+
+// Discs of opacity 0.99 across x = 0, turned by a quarter about z from their own y axis.
+RadianceField WallOfSplats() {
+  Splats splats(9, 1);
+  for (int i = 0; i < 9; ++i) {
+    Splat<float> splat;
+    splat.mean = {0, 0.25f * static_cast<float>(i / 3 - 1),
+                  0.25f * static_cast<float>(i % 3 - 1)};
+    splat.log_scale = {std::log(0.3f), std::log(0.01f), std::log(0.3f)};
+    splat.quaternion[0] = splat.quaternion[3] = 2;
+    splat.opacity_logit = std::log(99.0f);
+    splats.Set(i, splat);
+  }
+  return FieldOfSplats(splats, {{}, {0, 0, 0}, {1, 1, 1}}, 0, false);
+}
+
+// Photos' places beside a wall: a path along them is clear, one through the wall is not.
+TEST(PathClearance, FindsAPathThroughASurface) {
   std::vector<Camera> photos = Arc(6, false);
   const auto place = [](double x, double y) {
     Camera camera = Arc(2, false)[0];
@@ -135,13 +156,33 @@ TEST(PathClearance, FindsAPathThroughASurface) {
     beside.push_back(place(-0.5, -0.5 + 0.025 * i));
     through.push_back(place(-0.6 + 0.03 * i, 0));
   }
-  const PathClearance clear = MeasureClearance(field, photos, beside);
-  EXPECT_EQ(clear.transmittance, 1);
-  EXPECT_LE(clear.photo_distance, std::hypot(0.1, 0.1) / 0.2 + 1e-9);
-  EXPECT_GT(clear.photo_distance, 0.45);
-  const PathClearance blocked = MeasureClearance(field, photos, through);
-  EXPECT_LT(blocked.transmittance, 1e-3);
-  EXPECT_GT(blocked.photo_distance, 5);
+  for (const RadianceField& field : {WallOfVoxels(), WallOfSplats()}) {
+    const PathClearance clear = MeasureClearance(field, photos, beside);
+    EXPECT_EQ(clear.transmittance, 1);
+    EXPECT_LE(clear.photo_distance, std::hypot(0.1, 0.1) / 0.2 + 1e-9);
+    EXPECT_GT(clear.photo_distance, 0.45);
+    const PathClearance blocked = MeasureClearance(field, photos, through);
+    EXPECT_LT(blocked.transmittance, 1e-3);
+    EXPECT_GT(blocked.photo_distance, 5);
+  }
+}
+
+// The parts of a line add up to what the splat hides along it, however it is cut.
+TEST(PathClearance, SegmentsOfALineAddUpToTheSplatsOpacity) {
+  Splats splats(1, 1);
+  Splat<float> splat;
+  splat.mean = {0.1f, 0.2f, -0.1f};
+  splat.log_scale = {-1, -2, -1.5f};
+  splat.quaternion[0] = 0.9f, splat.quaternion[1] = 0.2f, splat.quaternion[2] = -0.3f;
+  splat.opacity_logit = 1;
+  splats.Set(0, splat);
+  const RadianceField field = FieldOfSplats(splats, {{}, {0, 0, 0}, {1, 1, 1}}, 0, false);
+  const Vec3d mean = splat.mean.Cast<double>(), way{3, 1, 2};
+  std::vector<Vec3d> path;
+  for (const double t : {-1.0, -0.1, -0.02, 0.05, 0.3, 1.0}) path.push_back(mean + way * t);
+  double depth = 0;
+  for (const double part : SplatDepthAlong(field, path)) depth += part;
+  EXPECT_NEAR(1 - std::exp(-depth), 1 / (1 + std::exp(-1.0)), 1e-6);
 }
 
 TEST(FilmTiming, SamplesAreAtFixedTimesWhateverTheRate) {

@@ -4,6 +4,7 @@
 
 #include "kernels/field/refine_cells.h"
 #include "kernels/field/render_ray.h"
+#include "kernels/splats/splat_field.h"
 #include "stylize/field/blend_fields.h"
 #include "stylize/field/object_weights.h"
 #include "stylize/field/volume_variance.h"
@@ -281,6 +282,20 @@ TEST(CellStyle, H49_StylesOfOtherCellsAreRefused) {
   changed([](CellGrid* cells) { cells->key[cells->key.size() - 1] ^= 1; });
   changed([](CellGrid* cells) { cells->finest = 2; });
   EXPECT_EQ(MixFields(source, {&same}, {1}, nullptr).appearance.sh[5], source.appearance.sh[5]);
+}
+
+// Positions of splats: as voxels' within the box, EQ(splat-position) outside of it.
+TEST(FillFeatures, SplatsFarOutsideStayInReach) {
+  Splats splats(3, 1);
+  const Vec3f means[] = {{2, 1, -3}, {5, 1, -1}, {1e20f, 0, 1}};
+  for (int i = 0; i < 3; ++i) splats.Set(i, {.mean = means[i]});
+  const RadianceField field = FieldOfSplats(splats, {{}, {1, 1, -1}, {2, 1, 4}}, 0, false);
+  const Vec3f expected[] = {{0.5f, 0, -0.5f}, {1.5f, 0, 0}, {2, 0, 0}};
+  for (int i = 0; i < 3; ++i) {
+    float row[kFeatureStride];
+    FillFeatures(field, 3, i, i, row);
+    for (int a = 0; a < 3; ++a) EXPECT_NEAR(row[27 + a], 3 * expected[i][a], 1e-5) << i;
+  }
 }
 
 }  // namespace

@@ -1,0 +1,31 @@
+#include "kernels/splats/rotate_harmonics.h"
+
+#include <cmath>
+
+namespace regrade {
+
+HarmonicsMatrix RotateHarmonics(const Mat3d& rotation) {
+  // Roots and weights of the Legendre polynomial of degree 4 on [-1, 1].
+  const double inner = std::sqrt((3 - 2 * std::sqrt(1.2)) / 7),
+               outer = std::sqrt((3 + 2 * std::sqrt(1.2)) / 7),
+               of_inner = (18 + std::sqrt(30.0)) / 36, of_outer = (18 - std::sqrt(30.0)) / 36;
+  const double root[] = {-outer, -inner, inner, outer},
+               weight[] = {of_outer, of_inner, of_inner, of_outer};
+  constexpr int kAround = 8;
+  const Mat3d back = rotation.Transposed();
+  HarmonicsMatrix matrix{};
+  for (int i = 0; i < 4; ++i)
+    for (int k = 0; k < kAround; ++k) {
+      const double across = std::sqrt(1 - root[i] * root[i]), angle = 2 * M_PI * k / kAround;
+      const Vec3d direction{across * std::cos(angle), across * std::sin(angle), root[i]};
+      double to[kMaxSplatBasis], from[kMaxSplatBasis];
+      ShBasisTo3(kMaxSplatBasis, direction, to);
+      ShBasisTo3(kMaxSplatBasis, back * direction, from);
+      for (size_t a = 0; a < kMaxSplatBasis; ++a)
+        for (size_t b = 0; b < kMaxSplatBasis; ++b)
+          matrix[a][b] += weight[i] * 2 * M_PI / kAround * to[a] * from[b];
+    }
+  return matrix;
+}
+
+}  // namespace regrade

@@ -1,0 +1,197 @@
+// Splats as a field: rendered, stored, checkpointed, and the photos that they are fitted to.
+#include "kernels/splats/splat_field.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cstring>
+
+#include "kernels/base/half.h"
+#include "kernels/image/undistort_photo.h"
+#include "kernels/render/field_renderer.h"
+#include "kernels/splats/covariance.h"
+#include "kernels/splats/rendered_splats.h"
+#include "pipeline/capture/working_views.h"
+#include "pipeline/fields/field_file.h"
+#include "pipeline/fields/splat_checkpoint.h"
+#include "pipeline/fields/splat_ply.h"
+#include "pipeline/images/still_file.h"
+#include "pipeline/stages/field_fit.h"
+#include "tests/support/expect_error.h"
+#include "tests/support/small_splats.h"
+#include "tests/support/temporary_folder.h"
+
+namespace regrade {
+namespace {
+
+using testing::CastSplats;
+using testing::RandomSplats;
+using testing::SplatCameraOf;
+using testing::TemporaryFolder;
+
+const GridFrame kBox{{}, {0.1f, 0, 0}, {1, 2, 1}};
+
+RadianceField SmallSplatField(int64_t count, int basis, uint64_t seed = 1) {
+  return FieldOfSplats(CastSplats<float>(RandomSplats(count, basis, seed)), kBox, 0.2f, false);
+}
+
+template <typename A, typename B>
+bool Same(const A& a, const B& b) {
+  return std::equal(a.data(), a.data() + a.size(), b.data(), b.data() + b.size());
+}
+
+TEST(SplatField, RendersAsThePlainPicture) {
+  const RadianceField field = SmallSplatField(200, 9);
+  const Camera camera = SplatCameraOf(61, 43);
+  const RenderedView plain =
+      RenderedSplats(RenderSplatsPlain(SplatsOf(field), camera, SplatOptionsOf(field)));
+  const RenderedView view = FieldRenderer(field, Backend::kCpu).Render(camera);
+  for (size_t i = 0; i < plain.color.pixels.size(); ++i)
+    ASSERT_NEAR(view.color.pixels[i], plain.color.pixels[i], 2e-5) << i;
+  for (size_t i = 0; i < plain.depth.pixels.size(); ++i)
+    ASSERT_NEAR(view.depth.pixels[i], plain.depth.pixels[i], 1e-3) << i;
+}
+
+// As a styled field and its source are rendered: the same bits as alone.
+TEST(SplatField, APairIsTwoViews) {
+  const RadianceField field = SmallSplatField(200, 4);
+  RadianceField other = field;
+  other.appearance = SmallSplatField(200, 9, 2).appearance;
+  other.background = {1, 0, 0.5f};
+  const Camera camera = SplatCameraOf(61, 43);
+  const FieldRenderer a(field, Backend::kCpu), b(other, Backend::kCpu);
+  const RenderedPair pair = a.RenderWith(b, camera);
+  EXPECT_EQ(pair.view.color.pixels, a.Render(camera).color.pixels);
+  EXPECT_EQ(pair.other_color.pixels, b.Render(camera).color.pixels);
+}
+
+TEST(SplatField, AFileKeepsMeansAndRoundsTheRestToHalves) {
+  const TemporaryFolder folder;
+  for (const int basis : {1, 4, 9}) {
+    StoredField out{SmallSplatField(50, basis), {}, {}};
+    out.field_from_world.scale = 3;
+    WriteFieldFile(folder / "field.npz", out);
+    const StoredField in = ReadFieldFile(folder / "field.npz");
+    const SplatGeometry &a = in.field.geometry->splats, &b = out.field.geometry->splats;
+    ASSERT_TRUE(a.on());
+    EXPECT_TRUE(Same(a.mean, b.mean));
+    for (const auto member :
+         {&SplatGeometry::log_scale, &SplatGeometry::quaternion, &SplatGeometry::opacity_logit})
+      for (int64_t i = 0; i < (b.*member).size(); ++i)
+        ASSERT_EQ((a.*member)[i], FloatFromHalf(HalfFromFloat((b.*member)[i])));
+    EXPECT_EQ(in.field.appearance.basis, basis);
+    EXPECT_EQ(in.field.near_clip, 0.2f);
+    EXPECT_EQ(in.field.geometry->frame.radius, kBox.radius);
+    EXPECT_EQ(in.field_from_world.scale, 3);
+    WriteFieldFile(folder / "again.npz", in);
+    EXPECT_EQ(testing::ReadText(folder / "again.npz"), testing::ReadText(folder / "field.npz"));
+  }
+}
+
+TEST(SplatField, AFileWithAValueThatIsNotFiniteIsRefused) {
+  const TemporaryFolder folder;
+  RadianceField field = SmallSplatField(5, 1);
+  auto geometry = std::make_shared<Geometry>(*field.geometry);
+  geometry->splats.mean[4] = std::nanf("");
+  field.geometry = geometry;
+  WriteFieldFile(folder / "field.npz", {field, {}, {}});
+  EXPECT_REGRADE_ERROR(ReadFieldFile(folder / "field.npz"), ExitCode::kInput, "not finite");
+}
+
+TEST(SplatCheckpoint, AStateComesBackBitForBit) {
+  SplatFitState state;
+  state.splats = CastSplats<float>(RandomSplats(7, 4, 1));
+  state.first_moment = CastSplats<float>(RandomSplats(7, 4, 2));
+  state.second_moment = CastSplats<float>(RandomSplats(7, 4, 3));
+  state.step = 17;
+  state.tally = {1.5, 2.5, 3, 4, 5, 6, 7, {{8, 9.5, 10.5, 11}}};
+  const std::string bytes = PackSplatFitState(state, "a note").Joined();
+  std::string note;
+  const std::optional<SplatFitState> back = UnpackSplatFitState(bytes, &note);
+  ASSERT_TRUE(back);
+  EXPECT_EQ(note, "a note");
+  EXPECT_EQ(back->step, 17);
+  EXPECT_EQ(PackSplatFitState(*back, note).Joined(), bytes);
+  EXPECT_EQ(back->second_moment.sh, state.second_moment.sh);
+  for (const size_t size : {size_t{0}, size_t{3}, bytes.size() / 2, bytes.size() - 1})
+    EXPECT_FALSE(UnpackSplatFitState(std::string_view(bytes).substr(0, size), &note)) << size;
+}
+
+// The file's floats, read by their places, rendered by the same camera in the capture's world.
+TEST(SplatPly, IsThePictureInTheCapturesWorld) {
+  const TemporaryFolder folder;
+  StoredField stored{SmallSplatField(80, 9), {}, {}};
+  const double turn[4] = {0.8, 0.1, -0.5, 0.3};
+  stored.field_from_world = {2.5, RotationOf(turn), {0.3, -0.2, 0.7}};
+  WriteSplatPly(folder / "field.ply", stored, "a comment");
+  const std::string file = testing::ReadText(folder / "field.ply");
+  const size_t begin = file.find("end_header\n") + 11;
+  EXPECT_NE(file.find("element vertex 80\n"), std::string::npos);
+  constexpr size_t kFloats = 3 + 3 + 27 + 1 + 3 + 4;
+  ASSERT_EQ(file.size() - begin, 80 * kFloats * sizeof(float));
+  Splats splats(80, 9);
+  for (size_t i = 0; i < 80; ++i) {
+    float row[kFloats];
+    std::memcpy(row, file.data() + begin + i * sizeof row, sizeof row);
+    Splat<float> splat;
+    splat.mean = {row[0], row[1], row[2]};
+    splat.opacity_logit = row[33];
+    splat.log_scale = {row[34], row[35], row[36]};
+    std::copy_n(row + 37, 4, splat.quaternion);
+    splats.Set(static_cast<int64_t>(i), splat);
+    for (size_t c = 0; c < 3; ++c) {
+      splats.sh[(3 * i + c) * 9] = row[6 + c];
+      std::copy_n(row + 9 + 8 * c, 8, &splats.sh[(3 * i + c) * 9 + 1]);
+    }
+  }
+  splats.background = stored.field.background;
+  Camera in_world = SplatCameraOf(61, 43);
+  in_world.camera_from_world.translation = in_world.camera_from_world.translation * 0.4;
+  const Camera in_field = in_world.Transformed(stored.field_from_world);
+  const SplatOptions options = SplatOptionsOf(stored.field);
+  SplatOptions world_options = options;
+  world_options.near_plane /= 2.5;
+  const auto a = RenderSplatsPlain(SplatsOf(stored.field), in_field, options),
+             b = RenderSplatsPlain(splats.view(), in_world, world_options);
+  double darkest = 1;
+  for (size_t p = 0; p < a.color.size(); ++p) ASSERT_NEAR(a.color[p], b.color[p], 1e-4) << p;
+  for (const float t : a.transmittance) darkest = std::min(darkest, double{t});
+  EXPECT_LT(darkest, 0.5);  // the camera sees splats
+}
+
+// A lens bends the photo's edges: what the undistorted photo does not show is masked.
+TEST(WorkingViews, PinholesHaveUndistortedPhotosAndMasks) {
+  const TemporaryFolder folder;
+  Image photo(64, 48);
+  for (int y = 0; y < 48; ++y)
+    for (int x = 0; x < 64; ++x)
+      for (int c = 0; c < 3; ++c)
+        photo.at(x, y)[c] = static_cast<float>((x * (c + 1) + 2 * y) % 97 + 60) / 255;
+  WriteStill(folder / "photo.png", photo);
+  Capture capture;
+  capture.views.push_back({"photo.png", "photo.png", folder / "photo.png", {}});
+  Camera& camera = capture.views[0].camera;
+  camera.width = 64, camera.height = 48;
+  camera.fx = camera.fy = 50, camera.cx = 32, camera.cy = 24;
+  camera.lens = LensModel::kOpenCv;
+  camera.distortion[0] = 0.2;  // a pincushion: the photo's corners are cut off
+  const WorkingViews views(capture, 64, 0), pinholes = views.Pinholes();
+  EXPECT_TRUE(views.Mask(0).empty());
+  EXPECT_EQ(views.CameraOf(0).lens, LensModel::kOpenCv);
+  EXPECT_EQ(pinholes.CameraOf(0).lens, LensModel::kPinhole);
+  const Image expected = UndistortPhoto(views.Photo(0), camera), seen = pinholes.Photo(0),
+              mask = pinholes.Mask(0);
+  int beyond = 0;
+  for (int64_t p = 0; p < mask.num_pixels(); ++p) {
+    const size_t at = static_cast<size_t>(p);
+    const bool known = std::isfinite(expected.pixels[3 * at]);
+    EXPECT_EQ(mask.pixels[at], known ? 1 : 0) << p;
+    EXPECT_EQ(seen.pixels[3 * at], known ? expected.pixels[3 * at] : 0) << p;
+    beyond += !known;
+  }
+  EXPECT_GT(beyond, 4);
+  EXPECT_LT(beyond, mask.num_pixels() / 2);
+}
+
+}  // namespace
+}  // namespace regrade
