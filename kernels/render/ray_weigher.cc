@@ -61,14 +61,13 @@ std::unique_ptr<RayWeigher> MakeRayWeigher(const Geometry& geometry, float near_
 }
 
 std::vector<double> RayDepths(const RadianceField& field, const ViewRays& rays,
-                              const MarchOptions& march) {
+                              const MarchOptions& march, RayWeigher* weigher) {
   std::vector<double> depths(rays.rays.size());
   const auto camera_of = [&](int64_t r) -> const Camera& {
     return rays.cameras[static_cast<size_t>(rays.places[static_cast<size_t>(r)].camera)];
   };
   if (field.geometry->splats.on()) {
-    SplatWeigher weigher(*field.geometry, field.near_clip, 0, 0);
-    const RayWeights weights = weigher.Weigh(rays, 0, rays.size());
+    const RayWeights weights = weigher->Weigh(rays);
     for (int64_t r = 0; r < rays.size(); ++r)
       depths[static_cast<size_t>(r)] =
           SplatDepth(field.geometry->splats, camera_of(r), weights, r);

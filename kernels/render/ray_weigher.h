@@ -27,13 +27,14 @@ class RayWeigher {
 // kept for the last camera, and for others while `kept_bytes` last: for rays whose cameras come
 // again and again. A place between the centres of pixels sees those of its tile's pixels.
 // The geometry must outlive the weigher.
+inline constexpr int64_t kManyViews = int64_t{1} << 30;  // of kept_bytes
 std::unique_ptr<RayWeigher> MakeRayWeigher(const Geometry& geometry, float near_clip,
                                            const MarchOptions& march, float min_weight = 0,
                                            int64_t kept_bytes = 0);
 
 // [rays]: depth along the camera's optical axis of what each ray meets, 0 where that is less
-// than half of its light.
+// than half of its light. `weigher`: of the field, with the least weight 0.
 std::vector<double> RayDepths(const RadianceField& field, const ViewRays& rays,
-                              const MarchOptions& march);
+                              const MarchOptions& march, RayWeigher* weigher);
 
 }  // namespace regrade

@@ -23,21 +23,29 @@ bool SameView(const Camera& a, const Camera& b) {
   return p.translation == q.translation && a.SameIntrinsics(b);
 }
 
-// The least rectangle around some places.
+// A rectangle of places, pixels.
 struct PlaceBox {
   double u0 = INFINITY, v0 = INFINITY, u1 = -INFINITY, v1 = -INFINITY;
 
+  PlaceBox() = default;
+  // Around what sees a splat, see EQ(splat-extent); a little wider, for rounding.
+  explicit PlaceBox(const SeenSplat<float>& splat) {
+    const ScreenEllipse<float>& e = splat.ellipse;
+    const double radius = std::sqrt(double{splat.reach}) * (1 + kExtentMargin) + kExtentMargin;
+    const double across = radius * double{e.c00};
+    const double down =
+        radius * std::sqrt(double{e.c10} * double{e.c10} + double{e.c11} * double{e.c11});
+    u0 = e.u - across, u1 = e.u + across, v0 = e.v - down, v1 = e.v + down;
+  }
   void Add(const ViewPlace& place) {
     u0 = std::min(u0, place.u), u1 = std::max(u1, place.u);
     v0 = std::min(v0, place.v), v1 = std::max(v1, place.v);
   }
-  // See EQ(splat-extent); a little wider, for rounding.
-  bool MaySee(const SeenSplat<float>& splat) const {
-    const ScreenEllipse<float>& e = splat.ellipse;
-    const double radius = std::sqrt(double{splat.reach}) * (1 + kExtentMargin) + kExtentMargin;
-    const double across = radius * double{e.c00};
-    const double down = radius * std::hypot(double{e.c10}, double{e.c11});
-    return e.u + across >= u0 && e.u - across <= u1 && e.v + down >= v0 && e.v - down <= v1;
+  bool Meets(const PlaceBox& other) const {
+    return u1 >= other.u0 && u0 <= other.u1 && v1 >= other.v0 && v0 <= other.v1;
+  }
+  bool Has(const ViewPlace& place) const {
+    return place.u >= u0 && place.u <= u1 && place.v >= v0 && place.v <= v1;
   }
 };
 
@@ -92,14 +100,17 @@ void SplatWeigher::WeighGroup(const ViewRays& rays, int64_t begin, Group* group,
   for (int64_t e = lists.first[tile]; e < lists.first[tile + 1] && !open.empty(); ++e) {
     const int32_t k = lists.splat[static_cast<size_t>(e)];
     SeenSplat<float> splat;
-    if (!SeeSplat(lists.numbers, options_, splats_, k, &splat) || !box.MaySee(splat)) continue;
+    if (!SeeSplat(lists.numbers, options_, splats_, k, &splat)) continue;
+    const PlaceBox sees(splat);
+    if (!sees.Meets(box)) continue;
     const Vec3f direction = DirectionToMean(lists.numbers.center, splats_[k].mean).unit;
     size_t left = 0;
     for (const int32_t i : open) {
       const ViewPlace& place = places[static_cast<size_t>(i)];
       PixelState<float>& state = states[static_cast<size_t>(i)];
       SplatHit<float> hit;
-      if (HitSplatAt(splat.ellipse, splat.log_opacity, splat.reach, place.u, place.v, &hit)) {
+      if (sees.Has(place) &&
+          HitSplatAt(splat.ellipse, splat.log_opacity, splat.reach, place.u, place.v, &hit)) {
         const float weight = state.transmittance * hit.alpha;
         if (!CompositeSplat(hit.alpha, Vec3f{}, 0.0f, &state)) continue;
         if (weight > min_weight_) {

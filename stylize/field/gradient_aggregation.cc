@@ -16,9 +16,6 @@ namespace {
 
 constexpr int64_t kBandRays = 16384;
 
-// Bytes, for what a weigher keeps of the views that steps draw patches of.
-constexpr int64_t kKeptBytes = int64_t{1} << 30;
-
 }  // namespace
 
 DenseNetwork<float> HiddenUnits(const LipschitzNetwork& network, int first) {
@@ -43,7 +40,7 @@ GradientAggregation::GradientAggregation(const RadianceField& field,
     : field_(field),
       options_(options),
       weigher_(MakeRayWeigher(*field.geometry, field.near_clip, options.march,
-                              options.min_weight, kKeptBytes)),
+                              options.min_weight, kManyViews)),
       corners_(field.geometry->splats.on() ? 1 : 8),
       vertex_of_voxel_(VertexOfVoxel(*field.geometry)),
       place_of_column_(PlaceOfColumn(field.geometry->spheres)),

@@ -138,7 +138,9 @@ TEST(SplatWeights, DoNotDependOnOrderOrMemory) {
 TEST(SplatWeights, DepthsAreThePictures) {
   const RadianceField field = SplatBall(900);
   const Camera camera = Ring(5, 40)[2];
-  const std::vector<double> depths = RayDepths(field, PixelsOf({camera}), MarchOptions{});
+  const auto weigher = MakeRayWeigher(*field.geometry, field.near_clip, MarchOptions{});
+  const std::vector<double> depths =
+      RayDepths(field, PixelsOf({camera}), MarchOptions{}, weigher.get());
   const Image picture = FieldRenderer(field, Backend::kCpu).Render(camera).depth;
   int seen = 0;
   for (size_t i = 0; i < depths.size(); ++i) {
