@@ -158,7 +158,7 @@ struct VarianceMetrics {
   VarianceGroupMetrics valid;        // none
   VarianceGroupMetrics clamped;      // a colour is clamped
   VarianceGroupMetrics transparent;  // light passes through the scene
-  Metric largest_fraction_of_bound;  // among the valid ones; at most 1
+  Metric largest_fraction_of_bound;  // where nothing is clamped; at most 1
   // Light from background spheres; voxels that are not wholly of the styled object.
   std::optional<VarianceGroupMetrics> spheres = {}, partial = {};
 

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <span>
 
 #include "kernels/base/error.h"
 #include "kernels/field/sample_basis.h"
@@ -14,8 +13,10 @@ namespace {
 
 constexpr double kGammaNorm = 0.84628437532163443;  // sqrt(9 / (4 pi))
 
+constexpr int32_t kBackground = -1;
+
 struct Atom {
-  int32_t voxel;
+  int32_t voxel;  // kBackground behind the last one
   double weight;
   Vec3f direction;  // at which its colour is taken
 };
@@ -26,6 +27,7 @@ struct Seen {
   Vec3d source{}, styled{};                // as rendered
   Vec3d closed_source{}, closed_styled{};  // with mu for weights, nothing clamped
   Vec3f direction;                         // of the ray
+  bool whole = false;                      // weights and transmittance make 1
   bool partial = false, on_sphere = false, transparent = false, clamped = false;
 };
 
@@ -82,8 +84,18 @@ class Observer {
       }
     }
     seen.transparent = !(inside_weight > 1 - kTransparentTransmittance);
+    const double all = inside_weight + left;
+    seen.whole = all > 1 - kTransparentTransmittance;
+    if (!seen.whole) return seen;
+    seen.atoms.push_back({kBackground, left, direction});
     for (Atom& atom : seen.atoms) {
-      atom.weight /= inside_weight;
+      atom.weight /= all;
+      if (atom.voxel == kBackground) {
+        const Vec3d grey{0.5, 0.5, 0.5};  // which ColorOf leaves out
+        seen.closed_source += (source_.background.Cast<double>() - grey) * atom.weight;
+        seen.closed_styled += (styled_.background.Cast<double>() - grey) * atom.weight;
+        continue;
+      }
       double gamma[kMaxBasis];
       ShBasis(basis_, atom.direction.Cast<double>(), gamma);
       seen.closed_source += ColorOf(source_.appearance, atom.voxel, gamma) * atom.weight;
@@ -94,19 +106,21 @@ class Observer {
 
   // The right side of EQ(vrr-bound).
   double Bound(const Seen& a, const Seen& b) const {
-    const double moved = Transport(a, b, [&](const Atom& one, const Atom& other) {
-      return Distance(one.voxel, other.voxel);
+    double changed = 0, mean[3 * kMaxBasis] = {};
+    const bool splats = source_.geometry->splats.on();
+    Couple(a, b, [&](const Atom& one, const Atom& other, double moved) {
+      if (one.voxel == kBackground || other.voxel == kBackground) {
+        changed += moved * Norm(ResidualColor(one) - ResidualColor(other));
+        return;
+      }
+      changed += moved * kGammaNorm * residual_bound_ * Distance(one.voxel, other.voxel);
+      double g[3 * kMaxBasis];
+      Residual(other.voxel, g);
+      if (splats) changed += moved * Turn(one.direction, other.direction) * NormOf(g);
+      for (int i = 0; i < 3 * basis_; ++i) mean[i] += moved * g[i];
     });
-    const double turned =
-        source_.geometry->splats.on()
-            ? Transport(a, b,
-                        [&](const Atom& one, const Atom& other) {
-                          const double turn = Turn(one.direction, other.direction);
-                          return turn > 0 ? turn * ResidualNorm({&other, 1}) : 0;
-                        })
-            : Turn(a.direction, b.direction) * ResidualNorm(b.atoms);
-    return base_norm_ * Norm(a.closed_source - b.closed_source) +
-           kGammaNorm * residual_bound_ * moved + turned;
+    if (!splats) changed += Turn(a.direction, b.direction) * NormOf(mean);
+    return base_norm_ * Norm(a.closed_source - b.closed_source) + changed;
   }
   // The mix of an object's style has the constant 1 - e + e K at most.
   double k() const {
@@ -115,7 +129,7 @@ class Observer {
   }
 
  private:
-  // Of a voxel, or of a texel of the spheres behind the voxels.
+  // Of a voxel, or of a texel of the spheres behind the voxels; without the constant 1/2.
   Vec3d ColorOf(const Appearance& appearance, int32_t point, const double* gamma) const {
     Vec3d color{};
     if (const int64_t texel = point - source_.geometry->num_voxels(); texel >= 0) {
@@ -146,17 +160,26 @@ class Observer {
     return std::sqrt(sum);
   }
 
-  // Of the mean of g.
-  double ResidualNorm(std::span<const Atom> atoms) const {
-    double sum[3 * kMaxBasis] = {}, norm = 0, weight = 0;
-    for (const Atom& atom : atoms) weight += atom.weight;
-    for (const Atom& atom : atoms) {
-      double g[3 * kMaxBasis];
-      Residual(atom.voxel, g);
-      for (int i = 0; i < 3 * basis_; ++i) sum[i] += atom.weight / weight * g[i];
+  double NormOf(const double* g) const {
+    double sum = 0;
+    for (int i = 0; i < 3 * basis_; ++i) sum += g[i] * g[i];
+    return std::sqrt(sum);
+  }
+
+  // What is added to the mapped colour: g Gamma(d), e of the background.
+  Vec3d ResidualColor(const Atom& atom) const {
+    Vec3d color;
+    if (atom.voxel == kBackground) {
+      color = styled_.background.Cast<double>();
+      if (!has_base_) return color - Vec3d{0.5, 0.5, 0.5};
+      return color - (base_.matrix * source_.background.Cast<double>() + base_.offset);
     }
-    for (int i = 0; i < 3 * basis_; ++i) norm += sum[i] * sum[i];
-    return std::sqrt(norm);
+    double g[3 * kMaxBasis], gamma[kMaxBasis];
+    Residual(atom.voxel, g);
+    ShBasis(basis_, atom.direction.Cast<double>(), gamma);
+    for (int c = 0; c < 3; ++c)
+      for (int k = 0; k < basis_; ++k) color[c] += g[c * basis_ + k] * gamma[k];
+    return color;
   }
 
   double Distance(int32_t one, int32_t other) const {
@@ -171,10 +194,10 @@ class Observer {
     return std::sqrt(sum);
   }
 
-  // sum pi_jk cost(j, k) of the coupling in the order of light.
-  template <typename Cost>
-  double Transport(const Seen& a, const Seen& b, const Cost& cost_of) const {
-    double cost = 0, left_a = 0, left_b = 0;
+  // Calls visit(j, k, pi_jk) of the coupling in the order of light.
+  template <typename Visit>
+  void Couple(const Seen& a, const Seen& b, const Visit& visit) const {
+    double left_a = 0, left_b = 0;
     size_t i = 0, j = 0;
     while (true) {
       if (left_a <= 0) {
@@ -186,11 +209,10 @@ class Observer {
         left_b = b.atoms[j++].weight;
       }
       const double moved = std::min(left_a, left_b);
-      if (moved > 0) cost += moved * cost_of(a.atoms[i - 1], b.atoms[j - 1]);
+      if (moved > 0) visit(a.atoms[i - 1], b.atoms[j - 1], moved);
       left_a -= moved;
       left_b -= moved;
     }
-    return cost;
   }
 
   const RadianceField& source_;
@@ -245,7 +267,9 @@ VarianceReport MeasureVariance(const RadianceField& source, const RadianceField&
     const Seen b = observer.Look(pairs.rays[2 * i + 1].direction, weights, ray + 1);
     Result& result = results[i];
     result = {Norm(a.source - b.source), Norm(a.styled - b.styled), 0, GroupOf(a, b)};
-    if (result.group != &VarianceReport::valid) continue;
+    if (!(a.whole && b.whole) || a.clamped || b.clamped) continue;
+    if (result.group != &VarianceReport::valid && result.group != &VarianceReport::transparent)
+      continue;
     const double bound = observer.Bound(a, b);
     if (bound > kVarianceSlack)
       result.fraction = Norm(a.closed_styled - b.closed_styled) / bound;

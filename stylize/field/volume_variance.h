@@ -13,7 +13,10 @@
 // light meets them, so the sum is W1's upper bound. |Gamma|^2 = 9 / (4 pi) for every direction.
 // Splats have directions d_rj of their own, see EQ(splat-color): in place of the last term is
 //   sum pi_jk |g_k| |Gamma(d_1j) - Gamma(d_2k)|,
-// to which a splat that both rays of one camera see adds nothing.
+// to which a splat that both rays of one camera see adds nothing. Where a ray transmits light,
+// the background is one more member of mu, behind all others, with the transmittance for weight
+// and e = c_bg' - A c_bg - b in place of g Gamma, (A, b) the map of colours: coupled with j it
+// adds pi |g_j Gamma(d_j) - e|.
 //
 // The propositions say K vrr, K = |A| + K_g: that holds for A alone (Prop. 1 and 3), and for g
 // under Prop. 2's premise that the rays' weighted colours agree sample by sample, which
@@ -50,7 +53,8 @@ struct VarianceReport {
   VarianceGroup transparent;    // a ray transmits light, or passes cells with empty corners
   VarianceGroup clamped;        // a sample's colour is clamped, before or after
   VarianceGroup valid;          // every premise of the bound holds
-  double largest_fraction = 0;  // of the bound, see EQ(vrr-bound), over `valid`; at most 1
+  double largest_fraction = 0;  // of EQ(vrr-bound), see there, over pairs without spheres,
+                                // parts of objects, empty corners and clamps; at most 1
 
   int64_t Pairs() const {
     return partial.pairs + spheres.pairs + transparent.pairs + clamped.pairs + valid.pairs;

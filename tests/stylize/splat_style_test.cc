@@ -354,6 +354,16 @@ TEST(SplatStyle, PairsStayBelowTheirBound) {
     EXPECT_GT(report.largest_fraction, 0.05);
     EXPECT_LE(report.largest_fraction, 1 + 1e-4);  // float's rounding of coefficients
   }
+  // Thin splats before a background that is restyled by another map.
+  auto thin = std::make_shared<Geometry>(*source.geometry);
+  for (float& logit : thin->splats.opacity_logit) logit -= 5;
+  RadianceField clear = source, clear_styled = styled;
+  clear.geometry = clear_styled.geometry = thin;
+  clear_styled.background = {0.7f, 0.1f, 0.5f};
+  const VarianceReport report = MeasureVariance(clear, clear_styled, network, neighbours, {});
+  EXPECT_GT(report.transparent.pairs, 1000);
+  EXPECT_GT(report.largest_fraction, 0.1);
+  EXPECT_LE(report.largest_fraction, 1 + 1e-4);
   const Threads single(1);
   EXPECT_EQ(PixelsOfOnePoint(source, cameras, 2000, 3, {}).size(), points.size());
 }
