@@ -53,7 +53,7 @@ struct VarianceReport {
   VarianceGroup transparent;    // a ray transmits light, or passes cells with empty corners
   VarianceGroup clamped;        // a sample's colour is clamped, before or after
   VarianceGroup valid;          // every premise of the bound holds
-  double largest_fraction = 0;  // of EQ(vrr-bound), see there, over pairs without spheres,
+  double largest_fraction = 0;  // see EQ(vrr-bound), over pairs without spheres,
                                 // parts of objects, empty corners and clamps; at most 1
 
   int64_t Pairs() const {
