@@ -22,12 +22,14 @@ class RayWeigher {
   RayWeights Weigh(const ViewRays& rays) { return Weigh(rays, 0, rays.size()); }
 };
 
+// Of kept_bytes: a list takes 4 B for each tile that a splat is in.
+inline constexpr int64_t kManyViews = int64_t{1} << 30;
+
 // Voxels are marched, see ComputeRayWeights. Splats have the weights w_i of
 // EQ(splat-composite); their cameras are pinholes. Which splats the tiles of a picture show is
 // kept for the last camera, and for others while `kept_bytes` last: for rays whose cameras come
 // again and again. A place between the centres of pixels sees those of its tile's pixels.
 // The geometry must outlive the weigher.
-inline constexpr int64_t kManyViews = int64_t{1} << 30;  // of kept_bytes
 std::unique_ptr<RayWeigher> MakeRayWeigher(const Geometry& geometry, float near_clip,
                                            const MarchOptions& march, float min_weight = 0,
                                            int64_t kept_bytes = 0);

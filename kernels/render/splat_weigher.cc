@@ -72,7 +72,6 @@ std::shared_ptr<const SplatWeigher::TileLists> SplatWeigher::ListsOf(const Camer
   auto lists = std::make_shared<TileLists>();
   lists->camera = camera;
   lists->numbers = frame.camera;
-  lists->tiles_x = frame.tiles_x;
   lists->first = std::move(frame.first_entry);
   lists->splat = std::move(frame.entry_splat);
   last_ = lists;
@@ -159,7 +158,7 @@ RayWeights SplatWeigher::Weigh(const ViewRays& rays, int64_t begin, int64_t end)
   };
   int64_t bytes = 0;
   for (size_t i = 0; i < order.size();) {
-    const auto [camera, first_tile, ray] = order[i];
+    const int32_t camera = std::get<0>(order[i]);
     const auto lists = ListsOf(rays.cameras[static_cast<size_t>(camera)]);
     bytes += lists->bytes();
     while (i < order.size() && std::get<0>(order[i]) == camera) {

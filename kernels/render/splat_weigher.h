@@ -23,7 +23,6 @@ class SplatWeigher : public RayWeigher {
   struct TileLists {
     Camera camera;
     SplatCamera numbers;
-    int tiles_x = 0;
     std::vector<int64_t> first;  // [tiles + 1]
     std::vector<int32_t> splat;
     int64_t bytes() const;
