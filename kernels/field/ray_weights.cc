@@ -85,6 +85,11 @@ float MarchDensity(const Geometry& geometry, const Ray& ray, const MarchOptions&
 }  // namespace
 
 void CornerPoints(const Geometry& geometry, const WeightedSample& sample, int32_t* point) {
+  if (geometry.splats.on()) {
+    std::fill_n(point, 8, -1);
+    point[0] = sample.vertex;
+    return;
+  }
   if (!sample.on_sphere()) {
     for (int k = 0; k < 8; ++k)
       point[k] = geometry.cells.on()

@@ -40,19 +40,25 @@ struct SplatHit {
   bool limited = false;  // alpha is 0.99
 };
 
-// False where the pixel does not see the splat; (x, y) is a pixel, whose centre is at + 0.5.
+// False where the place (u, v), in pixels, does not see the splat.
 template <typename T>
-HD bool HitSplat(const ScreenEllipse<T>& ellipse, T log_opacity, T reach, int x, int y,
-                 SplatHit<T>* hit) {
+HD bool HitSplatAt(const ScreenEllipse<T>& ellipse, T log_opacity, T reach, double u, double v,
+                   SplatHit<T>* hit) {
   using std::exp;
-  ellipse.Whiten(static_cast<T>(x + 0.5 - ellipse.u), static_cast<T>(y + 0.5 - ellipse.v),
-                 hit->w);
+  ellipse.Whiten(static_cast<T>(u - ellipse.u), static_cast<T>(v - ellipse.v), hit->w);
   const T q = hit->w[0] * hit->w[0] + hit->w[1] * hit->w[1];
   if (!(q <= reach)) return false;
   const T alpha = exp(log_opacity - q / 2);
   hit->limited = !(alpha < T(kMaxAlpha));
   hit->alpha = hit->limited ? T(kMaxAlpha) : alpha;
   return true;
+}
+
+// Of pixel (x, y), whose centre is at + 0.5.
+template <typename T>
+HD bool HitSplat(const ScreenEllipse<T>& ellipse, T log_opacity, T reach, int x, int y,
+                 SplatHit<T>* hit) {
+  return HitSplatAt(ellipse, log_opacity, reach, x + 0.5, y + 0.5, hit);
 }
 
 // Adds a splat; false, and nothing added, if the pixel ends before it.

@@ -39,13 +39,24 @@ SplatOptions SplatOptionsFor(float near_clip, const Vec3f& radius, bool antialia
   return options;
 }
 
-SplatsView<float> SplatsOf(const RadianceField& field) {
-  const SplatGeometry& splats = field.geometry->splats;
+SplatsView<float> SplatsWithoutColors(const SplatGeometry& splats) {
   REGRADE_CHECK(splats.on());
-  return {splats.mean.data(),         splats.log_scale.data(),
-          splats.quaternion.data(),   splats.opacity_logit.data(),
-          field.appearance.sh.data(), splats.opacity_logit.size(),
-          field.appearance.basis,     field.background};
+  SplatsView<float> view;
+  view.mean = splats.mean.data();
+  view.log_scale = splats.log_scale.data();
+  view.quaternion = splats.quaternion.data();
+  view.opacity_logit = splats.opacity_logit.data();
+  view.count = splats.opacity_logit.size();
+  view.basis = 0;
+  return view;
+}
+
+SplatsView<float> SplatsOf(const RadianceField& field) {
+  SplatsView<float> view = SplatsWithoutColors(field.geometry->splats);
+  view.sh = field.appearance.sh.data();
+  view.basis = field.appearance.basis;
+  view.background = field.background;
+  return view;
 }
 
 SplatOptions SplatOptionsOf(const RadianceField& field) {

@@ -12,6 +12,9 @@ namespace regrade {
 // extents are `radius`.
 SplatOptions SplatOptionsFor(float near_clip, const Vec3f& radius, bool antialiased);
 
+// For geometry alone: a view of basis 0, without coefficients.
+SplatsView<float> SplatsWithoutColors(const SplatGeometry& splats);
+
 // `field` has splats. The view is valid as long as the field.
 SplatsView<float> SplatsOf(const RadianceField& field);
 SplatOptions SplatOptionsOf(const RadianceField& field);

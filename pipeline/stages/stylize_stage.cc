@@ -55,7 +55,7 @@ void SetVariance(const RestyledField& restyled, const std::vector<StyledTraining
   std::vector<Camera> cameras;
   for (const StyledTrainingView& view : views) cameras.push_back(view.camera);
   const MarchOptions march{restyled.source.step};
-  const auto measure = [&](const std::vector<RayPair>& pairs) {
+  const auto measure = [&](const RayPairs& pairs) {
     return MetricsOfVariance(MeasureVariance(restyled.source, restyled.styled,
                                              restyled.trained.network, pairs, march,
                                              object_weights));

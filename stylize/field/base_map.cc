@@ -3,7 +3,7 @@
 #include <algorithm>
 
 #include "kernels/field/background_spheres.h"
-#include "kernels/field/spherical_harmonics.h"
+#include "kernels/field/sample_basis.h"
 #include "kernels/field/trilinear.h"
 
 namespace regrade {
@@ -41,16 +41,15 @@ Vec3f SphereColor(const RadianceField& field, const WeightedSample& sample) {
 
 ColorMap LeastSquaresMap(const RadianceField& field, const StyleRays& batch,
                          const AggregationOptions& options) {
-  const Geometry& geometry = *field.geometry;
-  const int64_t n = std::ssize(batch.rays);
-  const RayWeights weights = ComputeRayWeights(geometry, {batch.rays.data(), n}, options.march,
-                                               field.near_clip, options.min_weight);
+  const int64_t n = batch.size();
+  const RayWeights weights =
+      MakeRayWeigher(*field.geometry, field.near_clip, options.march, options.min_weight)
+          ->Weigh(batch);
   const int basis = field.appearance.basis;
   std::vector<Vec3f> foreground(n);
 #pragma omp parallel for schedule(dynamic, 64)
   for (int64_t r = 0; r < n; ++r) {
-    float gamma[kMaxBasis];
-    ShBasis(basis, batch.rays[r].direction, gamma);
+    SampleBasis<float> harmonics(basis, batch.rays[r].direction, weights);
     for (int64_t i = weights.first[r]; i < weights.first[static_cast<size_t>(r) + 1]; ++i) {
       const WeightedSample& sample = weights.samples[i];
       if (sample.on_sphere()) {
@@ -59,6 +58,7 @@ ColorMap LeastSquaresMap(const RadianceField& field, const StyleRays& batch,
       }
       float sh[3 * kMaxBasis];
       BlendAt(field, sample, sh);
+      const float* const gamma = harmonics.Of(i);
       for (int c = 0; c < 3; ++c) {
         float value = 0.5f;
         for (int k = 0; k < basis; ++k) value += sh[c * basis + k] * gamma[k];

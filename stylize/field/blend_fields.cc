@@ -62,8 +62,11 @@ bool SameGeometry(const Geometry& a, const Geometry& b) {
          same_vector(a.frame.radius, b.frame.radius) && same(a.links, b.links) &&
          a.cells.finest == b.cells.finest && same(a.cells.key, b.cells.key) &&
          same(a.cells.level, b.cells.level) && same(a.density, b.density) &&
-         a.spheres.layers == b.spheres.layers && same(a.spheres.links, b.spheres.links) &&
-         same(a.spheres.density, b.spheres.density);
+         same(a.splats.mean, b.splats.mean) && same(a.splats.log_scale, b.splats.log_scale) &&
+         same(a.splats.quaternion, b.splats.quaternion) &&
+         same(a.splats.opacity_logit, b.splats.opacity_logit) &&
+         a.splats.antialiased == b.splats.antialiased && a.spheres.layers == b.spheres.layers &&
+         same(a.spheres.links, b.spheres.links) && same(a.spheres.density, b.spheres.density);
 }
 
 RadianceField MixFields(const RadianceField& source,

@@ -29,7 +29,7 @@ RadianceField MixFields(const RadianceField& source,
                         const std::vector<double>& weights,
                         const std::vector<float>* object_weights = nullptr);
 
-// Whether two fields have the same voxels in the same places; densities too.
+// Whether two fields have the same voxels, or splats, in the same places; densities too.
 bool SameGeometry(const Geometry& a, const Geometry& b);
 
 }  // namespace regrade

@@ -19,16 +19,11 @@ class Coefficients {
   Coefficients(const RadianceField& field, const std::vector<Camera>& cameras,
                const std::vector<Image>& missing, const CoefficientFitOptions& options) {
     const int64_t most = options.most_rays / std::max<int64_t>(1, std::ssize(cameras));
-    std::vector<Vec3f> directions;
     for (size_t i = 0; i < cameras.size(); ++i)
       AddResidualRays(field, cameras[i], missing[i], most, options.seed + i, &rays_,
-                      &directions);
-    gamma_.resize(kHarmonics * directions.size());
-    for (size_t r = 0; r < directions.size(); ++r) {
-      float* const gamma = &gamma_[kHarmonics * r];
-      ShBasis(kHarmonics, directions[r], gamma);
-      std::fill(gamma + options.harmonics, gamma + kHarmonics, 0.0f);
-    }
+                      &directions_);
+    of_entries_ = field.geometry->splats.on();
+    harmonics_ = options.harmonics;
     // Most voxels are seen by no ray: memory follows those that are.
     std::vector<int32_t> place(static_cast<size_t>(field.geometry->num_voxels()), -1);
     for (const int32_t voxel : rays_.voxel) place[static_cast<size_t>(voxel)] = 0;
@@ -49,12 +44,20 @@ class Coefficients {
 #pragma omp parallel for schedule(static)
     for (int64_t r = 0; r < rays_.num_rays(); ++r) {
       double sum[kTerms] = {};
-      for (int64_t i = rays_.first[r]; i < rays_.first[r + 1]; ++i)
+      double gamma[kHarmonics];
+      const auto add_color = [&](int64_t direction, const double* sh) {
+        Gamma(direction, gamma);
+        for (int c = 0; c < 3; ++c)
+          for (int k = 0; k < kHarmonics; ++k)
+            colors[r][c] += gamma[k] * sh[kHarmonics * c + k];
+      };
+      for (int64_t i = rays_.first[r]; i < rays_.first[r + 1]; ++i) {
+        if (of_entries_) std::fill_n(sum, kTerms, 0.0);
         for (int k = 0; k < kTerms; ++k)
           sum[k] += double{rays_.weight[i]} * x[kTerms * int64_t{rays_.voxel[i]} + k];
-      for (int c = 0; c < 3; ++c)
-        for (int k = 0; k < kHarmonics; ++k)
-          colors[r][c] += double{gamma_[kHarmonics * r + k]} * sum[kHarmonics * c + k];
+        if (of_entries_) add_color(i, sum);
+      }
+      if (!of_entries_) add_color(r, sum);
     }
     return colors;
   }
@@ -71,22 +74,37 @@ class Coefficients {
         const auto first = rays_.voxel.begin();
         auto at = std::lower_bound(first + rays_.first[r], first + rays_.first[r + 1], begin);
         if (at == first + rays_.first[r + 1] || *at >= end) continue;
-        double term[kTerms];
-        for (int c = 0; c < 3; ++c)
-          for (int k = 0; k < kHarmonics; ++k)
-            term[kHarmonics * c + k] = double{gamma_[kHarmonics * r + k]} * colors[r][c];
-        for (; at != first + rays_.first[r + 1] && *at < end; ++at)
+        double term[kTerms], gamma[kHarmonics];
+        const auto find_terms = [&](int64_t direction) {
+          Gamma(direction, gamma);
+          for (int c = 0; c < 3; ++c)
+            for (int k = 0; k < kHarmonics; ++k)
+              term[kHarmonics * c + k] = gamma[k] * colors[r][c];
+        };
+        if (!of_entries_) find_terms(r);
+        for (; at != first + rays_.first[r + 1] && *at < end; ++at) {
+          if (of_entries_) find_terms(at - first);
           for (int k = 0; k < kTerms; ++k)
             x[kTerms * int64_t{*at} + k] += double{rays_.weight[at - first]} * term[k];
+        }
       }
     }
     return x;
   }
 
  private:
+  // [kHarmonics], as floats.
+  void Gamma(int64_t direction, double* gamma) const {
+    float values[kHarmonics];
+    ShBasis(kHarmonics, directions_[static_cast<size_t>(direction)], values);
+    for (int k = 0; k < kHarmonics; ++k) gamma[k] = k < harmonics_ ? double{values[k]} : 0;
+  }
+
   ResidualRays rays_;  // `voxel` counts those of seen_
   std::vector<int64_t> seen_;
-  std::vector<float> gamma_;  // [rays, 9]
+  std::vector<Vec3f> directions_;  // [rays], of splats of each entry
+  bool of_entries_ = false;
+  int harmonics_ = kHarmonics;
 };
 
 double Square(const std::vector<double>& x) {

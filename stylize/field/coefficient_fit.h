@@ -22,10 +22,10 @@ struct CoefficientFitOptions {
 // EQ(coefficient-fit), as Instant Colorization solves it for splats: coefficients x_vck of
 // voxel v, channel c and harmonic k that minimise
 //   sum over rays r and c of (sum_v W_rv sum_k Gamma_k(d_r) x_vck - t_rc)^2,
-// W_rv the weight of v in r, see EQ(voxel-residual), d_r the ray's direction and t_r =
-// `missing` [H, W, 3], one for each camera, at r's pixel; pixels that are not finite do not
-// count. By `steps` of conjugate gradients from x = 0: what is seen from few places is not
-// driven far. Clamps of colours are left out.
+// W_rv the weight of v in r, see EQ(voxel-residual), d_r the ray's direction (of splats d_rv,
+// see EQ(splat-color)) and t_r = `missing` [H, W, 3], one for each camera, at r's pixel; pixels
+// that are not finite do not count. By `steps` of conjugate gradients from x = 0: what is seen
+// from few places is not driven far. Clamps of colours are left out.
 //
 // Returns the field with x added; it has 9 harmonics. Deterministic for any number of threads.
 RadianceField FitCoefficients(RadianceField field, const std::vector<Camera>& cameras,

@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <numeric>
 
-#include "kernels/field/spherical_harmonics.h"
+#include "kernels/field/sample_basis.h"
 #include "kernels/field/trilinear.h"
 #include "stylize/field/base_map.h"
 #include "stylize/field/color_error.h"
@@ -15,12 +15,6 @@ namespace regrade {
 namespace {
 
 constexpr int64_t kBandRays = 16384;
-
-// Gamma(d) [9]; zero beyond the field's own basis, which is all that a restyled field keeps.
-void RayBasis(int basis, const Vec3f& direction, float* gamma) {
-  std::fill_n(gamma, kMaxBasis, 0.0f);
-  ShBasis(basis, direction, gamma);
-}
 
 }  // namespace
 
@@ -36,7 +30,7 @@ DenseNetwork<float> HiddenUnits(const LipschitzNetwork& network, int first) {
 struct GradientAggregation::Band {
   int64_t begin = 0, end = 0;
   RayWeights weights;
-  std::vector<int32_t> slots;         // [samples, 8]; -1 at an empty corner
+  std::vector<int32_t> slots;         // [samples, corners]; -1 at an empty corner
   std::vector<uint8_t> unclamped;     // [samples]: bit c is set where channel c is not clamped
   std::vector<Vec3f> color, d_color;  // [rays]; d_color without the loss's normalisation
 };
@@ -45,6 +39,9 @@ GradientAggregation::GradientAggregation(const RadianceField& field,
                                          const AggregationOptions& options)
     : field_(field),
       options_(options),
+      weigher_(MakeRayWeigher(*field.geometry, field.near_clip, options.march,
+                              options.min_weight, kManyViews)),
+      corners_(field.geometry->splats.on() ? 1 : 8),
       vertex_of_voxel_(VertexOfVoxel(*field.geometry)),
       place_of_column_(PlaceOfColumn(field.geometry->spheres)),
       slot_of_point_(static_cast<size_t>(field.geometry->num_voxels() +
@@ -53,12 +50,13 @@ GradientAggregation::GradientAggregation(const RadianceField& field,
 
 // Slots in the order of first touch: a function of the rays alone.
 void GradientAggregation::Touch(Band* band) {
-  band->slots.resize(band->weights.samples.size() * 8);
+  band->slots.resize(band->weights.samples.size() * static_cast<size_t>(corners_));
   int32_t* slot = band->slots.data();
   for (const WeightedSample& sample : band->weights.samples) {
     int32_t points[8];
     CornerPoints(*field_.geometry, sample, points);
-    for (const int32_t point : points) {
+    for (int k = 0; k < corners_; ++k) {
+      const int32_t point = points[k];
       if (point < 0) {
         *slot++ = -1;
         continue;
@@ -84,50 +82,78 @@ namespace {
 // Background spheres have plain colours.
 int TermsOf(const WeightedSample& sample) { return sample.on_sphere() ? 1 : 9; }
 
+// Samples of one ray, each of which blends `kCorners` points.
+struct StyledRay {
+  const RayWeights& weights;
+  int64_t first, n;      // samples
+  const int32_t* slots;  // of all samples
+  SampleBasis<float> basis;
+
+  StyledRay(const RayWeights& weights, const std::vector<int32_t>& slots, int64_t ray,
+            int basis, const Vec3f& direction)
+      : weights(weights),
+        first(weights.first[static_cast<size_t>(ray)]),
+        n(weights.first[static_cast<size_t>(ray) + 1] - first),
+        slots(slots.data()),
+        basis(basis, direction, weights) {}
+};
+
 // Colours of a ray before the background, and which channels of which samples the clamp left
 // unclamped.
-Vec3f RenderStyled(const WeightedSample* samples, const int32_t* slots, int64_t n,
-                   const float* gamma, const float* sh, uint8_t* unclamped) {
+template <int kCorners>
+Vec3f RenderStyled(StyledRay* ray, const float* sh, uint8_t* unclamped) {
   Vec3f color{0, 0, 0};
-  for (int64_t i = 0; i < n; ++i) {
+  for (int64_t i = ray->first; i < ray->first + ray->n; ++i) {
+    const WeightedSample& sample = ray->weights.samples[static_cast<size_t>(i)];
     float blend[kFeatureStride] = {};
-    for (int corner = 0; corner < 8; ++corner) {
-      const int32_t slot = slots[i * 8 + corner];
+    for (int corner = 0; corner < kCorners; ++corner) {
+      const int32_t slot = ray->slots[i * kCorners + corner];
       if (slot < 0) continue;
-      const float w = CornerWeight(samples[i].fraction, corner);
+      const float w = CornerWeight(sample.fraction, corner);
       const float* row = sh + static_cast<int64_t>(slot) * kFeatureStride;
       for (int l = 0; l < kFeatureStride; ++l) blend[l] += w * row[l];
     }
-    const int terms = TermsOf(samples[i]);
+    const int terms = TermsOf(sample);
+    const float* const gamma = ray->basis.Of(i);
     uint8_t bits = 0;
     for (int c = 0; c < 3; ++c) {
       float value = 0.5f;
       for (int k = 0; k < terms; ++k) value += blend[c * 9 + k] * gamma[k];
       if (!(value > 0)) continue;
       bits = static_cast<uint8_t>(bits | (1 << c));
-      color[c] += samples[i].weight * value;
+      color[c] += sample.weight * value;
     }
     unclamped[i] = bits;
   }
   return color;
 }
 
-// Adds the adjoint of RenderStyled to the rows of d_sh in [first, last), and the masses of
-// EQ(view-penalty).
-void ScatterStyled(const WeightedSample* samples, const int32_t* slots, int64_t n,
-                   const float* gamma, const uint8_t* unclamped, const Vec3f& d_color,
-                   int32_t first, int32_t last, float* d_sh) {
-  // dL/d(blend) = w_i d_color[c] gamma[k] where unclamped; w_i joins the corner's weight below.
-  float d_blend[kFeatureStride] = {};
+// dL/d(blend) where no channel is clamped, without w_i, and 1 in the lanes of masses.
+void BlendAdjoint(const Vec3f& d_color, const float* gamma, float* d_blend) {
+  std::fill_n(d_blend, kFeatureStride, 0.0f);
   for (int c = 0; c < 3; ++c)
     for (int k = 0; k < 9; ++k) d_blend[c * 9 + k] = d_color[c] * gamma[k];
   std::fill_n(d_blend + kMassLane, 3, 1.0f);
-  for (int64_t i = 0; i < n; ++i) {
+}
+
+// Adds the adjoint of RenderStyled to the rows of d_sh in [begin, end), and the masses of
+// EQ(view-penalty).
+template <int kCorners>
+void ScatterStyled(StyledRay* ray, const uint8_t* unclamped, const Vec3f& d_color,
+                   int32_t begin, int32_t end, float* d_sh) {
+  float d_blend[kFeatureStride];
+  const float* gamma = nullptr;
+  const bool own = !ray->weights.directions.empty();  // directions of samples
+  for (int64_t i = ray->first; i < ray->first + ray->n; ++i) {
     const uint8_t bits = unclamped[i];
     if (bits == 0) continue;
+    const int32_t* const slots = ray->slots + i * kCorners;
+    if (kCorners == 1 && (slots[0] < begin || slots[0] >= end)) continue;
+    const WeightedSample& sample = ray->weights.samples[static_cast<size_t>(i)];
+    if (gamma == nullptr || own) BlendAdjoint(d_color, gamma = ray->basis.Of(i), d_blend);
     float masked[kFeatureStride];
     const float* d = d_blend;
-    const int terms = TermsOf(samples[i]);
+    const int terms = TermsOf(sample);
     if (bits != 7 || terms != 9) {
       std::copy_n(d_blend, kFeatureStride, masked);
       for (int c = 0; c < 3; ++c) {
@@ -138,10 +164,10 @@ void ScatterStyled(const WeightedSample* samples, const int32_t* slots, int64_t 
       }
       d = masked;
     }
-    for (int corner = 0; corner < 8; ++corner) {
-      const int32_t slot = slots[i * 8 + corner];
-      if (slot < first || slot >= last) continue;
-      const float w = samples[i].weight * CornerWeight(samples[i].fraction, corner);
+    for (int corner = 0; corner < kCorners; ++corner) {
+      const int32_t slot = slots[corner];
+      if (slot < begin || slot >= end) continue;
+      const float w = sample.weight * CornerWeight(sample.fraction, corner);
       float* row = d_sh + static_cast<int64_t>(slot) * kFeatureStride;
       for (int l = 0; l < kFeatureStride; ++l) row[l] += w * d[l];
     }
@@ -154,8 +180,7 @@ void GradientAggregation::March(const StyleRays& batch, int64_t begin, int64_t e
                                 Band* band) {
   band->begin = begin;
   band->end = end;
-  band->weights = ComputeRayWeights(*field_.geometry, {batch.rays.data() + begin, end - begin},
-                                    options_.march, field_.near_clip, options_.min_weight);
+  band->weights = weigher_->Weigh(batch, begin, end);
   Touch(band);
 }
 
@@ -184,14 +209,11 @@ void GradientAggregation::RenderColors(const StyleRays& batch, Band* band) const
   band->color.resize(weights.num_rays());
 #pragma omp parallel for schedule(dynamic, 64)
   for (int64_t r = 0; r < weights.num_rays(); ++r) {
-    const int64_t first = weights.first[r];
-    float gamma[kMaxBasis];
-    RayBasis(field_.appearance.basis, batch.rays[band->begin + r].direction, gamma);
-    band->color[r] =
-        RenderStyled(weights.samples.data() + first, band->slots.data() + first * 8,
-                     weights.first[static_cast<size_t>(r) + 1] - first, gamma, sh_.data(),
-                     band->unclamped.data() + first) +
-        field_.background * weights.transmittance[r];
+    StyledRay ray(weights, band->slots, r, field_.appearance.basis,
+                  batch.rays[band->begin + r].direction);
+    const auto render = corners_ == 1 ? RenderStyled<1> : RenderStyled<8>;
+    band->color[r] = render(&ray, sh_.data(), band->unclamped.data()) +
+                     field_.background * weights.transmittance[r];
   }
 }
 
@@ -207,12 +229,10 @@ void GradientAggregation::Scatter(const StyleRays& batch, const Band& band) {
     for (int64_t r = 0; r < weights.num_rays(); ++r) {
       const Vec3f& d_color = band.d_color[r];
       if (d_color == Vec3f{0, 0, 0}) continue;
-      const int64_t first = weights.first[r];
-      float gamma[kMaxBasis];
-      RayBasis(field_.appearance.basis, batch.rays[band.begin + r].direction, gamma);
-      ScatterStyled(weights.samples.data() + first, band.slots.data() + first * 8,
-                    weights.first[static_cast<size_t>(r) + 1] - first, gamma,
-                    band.unclamped.data() + first, d_color, begin, end, d_sh_.data());
+      StyledRay ray(weights, band.slots, r, field_.appearance.basis,
+                    batch.rays[band.begin + r].direction);
+      const auto scatter = corners_ == 1 ? ScatterStyled<1> : ScatterStyled<8>;
+      scatter(&ray, band.unclamped.data(), d_color, begin, end, d_sh_.data());
     }
   }
 }
@@ -338,8 +358,8 @@ StyleLoss::HiddenSums GradientAggregation::SumHidden(const LipschitzNetwork& net
         if (!Counts(batch, band, r)) continue;
         float* out = &sums.hidden[next++ * kMlpHidden + static_cast<size_t>(half)];
         for (int64_t i = weights.first[r]; i < weights.first[static_cast<size_t>(r) + 1]; ++i)
-          for (int corner = 0; corner < 8; ++corner) {
-            const int32_t slot = band.slots[i * 8 + corner];
+          for (int corner = 0; corner < corners_; ++corner) {
+            const int32_t slot = band.slots[i * corners_ + corner];
             if (slot < 0) continue;
             const WeightedSample& sample = weights.samples[i];
             const float w = sample.weight * CornerWeight(sample.fraction, corner);

@@ -2,8 +2,8 @@
 //
 // EQ(liprf-loss):  L_rec = 1 / (3 Q) sum over Q rays r and channels c of (C_r,c(f) -
 // target_r,c)^2,
-//   C_r = sum_i w_i max(0, Gamma(d_r) . s_i + 1/2) + T_r c_bg,   s_i = trilinear blend of
-//   f(voxel).
+//   C_r = sum_i w_i max(0, Gamma(d_i) . s_i + 1/2) + T_r c_bg,   s_i = trilinear blend of
+//   f(voxel), d_i the ray's direction; of splats s_i = f(splat), and d_i as in EQ(splat-color).
 // Geometry is frozen, so w_i and T_r are constants. LipRF's Algorithm 1 sends every voxel
 // through f; a voxel that no ray touches has gradient zero, so sending the touched ones alone
 // gives the same gradient. The paper's text also allows 1 / B in place of 1 / (3 Q), B the
@@ -17,18 +17,20 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <vector>
 
 #include "kernels/base/buffer.h"
 #include "kernels/field/radiance_field.h"
 #include "kernels/field/ray_march.h"
 #include "kernels/field/ray_weights.h"
+#include "kernels/render/ray_weigher.h"
+#include "kernels/scene/view_rays.h"
 #include "stylize/field/lipschitz_network.h"
 
 namespace regrade {
 
-struct StyleRays {
-  std::vector<Ray> rays;
+struct StyleRays : ViewRays {
   std::vector<Vec3f> targets;  // sRGB; a ray with a non-finite target is left out
 };
 
@@ -135,6 +137,8 @@ class GradientAggregation : public StyleLoss {
 
   const RadianceField& field_;
   AggregationOptions options_;
+  std::unique_ptr<RayWeigher> weigher_;
+  int corners_;  // points that a sample may blend
   std::vector<int32_t> vertex_of_voxel_, place_of_column_;
   // Of points, see CornerPoints: voxels, and then the texels of background spheres.
   std::vector<int32_t> slot_of_point_;  // -1 between runs

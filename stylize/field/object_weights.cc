@@ -5,7 +5,6 @@
 #include <cmath>
 
 #include "kernels/base/error.h"
-#include "kernels/field/ray_weights.h"
 #include "kernels/field/spherical_harmonics.h"
 #include "kernels/field/trilinear.h"
 
@@ -22,8 +21,7 @@ void AddTo(uint64_t* sum, uint64_t value) {
 
 MaskVote::MaskVote(const Geometry& geometry, float near_clip, const MarchOptions& march)
     : geometry_(geometry),
-      near_clip_(near_clip),
-      march_(march),
+      weigher_(MakeRayWeigher(geometry, near_clip, march)),
       yes_(static_cast<size_t>(geometry.num_voxels())),
       all_(yes_.size()) {}
 
@@ -32,18 +30,17 @@ void MaskVote::Add(const Camera& camera, const Image& mask) {
                 mask.height == camera.height);
   constexpr int kRows = 16;  // lists of samples are kept for a band only
   for (int top = 0; top < camera.height; top += kRows) {
-    std::vector<Ray> rays;
+    ViewRays rays{.cameras = {camera}};
     std::vector<double> votes;
     for (int y = top; y < std::min(top + kRows, camera.height); ++y)
       for (int x = 0; x < camera.width; ++x) {
         const float vote = *mask.at(x, y);
         if (!std::isfinite(vote)) continue;
-        rays.push_back(camera.PixelRay(x, y));
+        rays.AddPixel(0, x, y);
         votes.push_back(std::clamp(vote, 0.0f, 1.0f));
       }
-    const int64_t count = std::ssize(rays);
-    const RayWeights weights =
-        ComputeRayWeights(geometry_, {rays.data(), count}, march_, near_clip_);
+    const int64_t count = rays.size();
+    const RayWeights weights = weigher_->Weigh(rays);
 #pragma omp parallel for schedule(dynamic, 64)
     for (int64_t r = 0; r < count; ++r)
       for (int64_t i = weights.first[r]; i < weights.first[static_cast<size_t>(r) + 1]; ++i) {

@@ -1,8 +1,10 @@
-// Object weights of a field's voxels, by a vote of masks of photos that need not agree.
+// Object weights of a field's voxels, or splats, by a vote of masks of photos that need not
+// agree.
 //
 // EQ(mask-vote): v_j = sum_r m_r W_rj / sum_r W_rj over the rays r of all masked photos, m_r
 // what the mask says of the ray's pixel and W_rj = sum_i w_i b_ij the weight with which the ray
-// sees voxel j (for w_i see EQ(composite), for b_ij see EQ(trilinear)). The object weight is
+// sees voxel j (for w_i see EQ(composite), for b_ij see EQ(trilinear); of splat j W_rj is w_j
+// of EQ(splat-composite)). The object weight is
 //   e_j = clamp((v_j - t + h) / (2 h), 0, 1),  h <= t and h <= 1 - t:
 // t the vote at which the weight is 1/2, h half the width of the edge. A voxel that no mask
 // votes for has v_j = 0 and so e_j = 0, exactly, as does one that only a few wrong masks hit; a
@@ -10,10 +12,12 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <vector>
 
 #include "kernels/field/radiance_field.h"
 #include "kernels/field/ray_march.h"
+#include "kernels/render/ray_weigher.h"
 #include "kernels/scene/camera.h"
 #include "kernels/scene/image.h"
 
@@ -32,8 +36,7 @@ class MaskVote {
 
  private:
   const Geometry& geometry_;
-  float near_clip_;
-  MarchOptions march_;
+  std::unique_ptr<RayWeigher> weigher_;
   std::vector<uint64_t> yes_, all_;  // of weights in steps of 2^-32
 };
 

@@ -5,8 +5,7 @@
 
 #include "kernels/base/error.h"
 #include "kernels/base/random.h"
-#include "kernels/field/render_ray.h"
-#include "kernels/field/resolve_pixel.h"
+#include "kernels/render/ray_weigher.h"
 
 namespace regrade {
 namespace {
@@ -26,72 +25,74 @@ struct Draw {
   }
 };
 
-// Depth along the optical axis of what a ray of the camera meets; 0 where it meets nothing.
-double DepthOf(const FieldView<float>& field, const Camera& camera, const Ray& ray,
-               const MarchOptions& march) {
-  const RayResult<float> result = RenderRay(field, ray, march);
-  Vec3f color = result.color;
-  float depth = result.depth;
-  ResolvePixel{camera}(ray, result.transmittance, &color, &depth);
-  return depth;
-}
-
-std::optional<RayPair> PairOfOnePoint(const FieldView<float>& field, const Camera& from,
-                                      const Camera& to, int x, int y,
-                                      const MarchOptions& march) {
-  const Ray ray = from.PixelRay(x, y);
-  const double depth = DepthOf(field, from, ray, march);
+// Where the next view sees what a ray meets at `depth`, 0 for nothing.
+std::optional<ViewPlace> PlaceInNext(const std::vector<Camera>& cameras, const ViewPlace& place,
+                                     double depth, double* expected) {
   if (!(depth > 0)) return std::nullopt;
-  const RayT<double> world = from.WorldRay(x + 0.5, y + 0.5);
+  const size_t next = (static_cast<size_t>(place.camera) + 1) % cameras.size();
+  const Camera &from = cameras[static_cast<size_t>(place.camera)], &to = cameras[next];
+  const RayT<double> world = from.WorldRay(place.u, place.v);
   const Vec3d point =
       world.origin + world.direction * (depth / Dot(world.direction, from.Forward()));
-  double u, v, expected;
-  if (!to.Project(point, &u, &v, &expected)) return std::nullopt;
+  double u, v;
+  if (!to.Project(point, &u, &v, expected)) return std::nullopt;
   if (!(u >= 0.5 && u <= to.width - 0.5 && v >= 0.5 && v <= to.height - 0.5))
     return std::nullopt;
-  const Ray other = to.FieldRay(u, v);
-  const double seen = DepthOf(field, to, other, march);
-  if (!(std::abs(seen / expected - 1) <= kDepthTolerance)) return std::nullopt;
-  return RayPair{ray, other};
+  return ViewPlace{static_cast<int32_t>(next), u, v};
 }
 
 }  // namespace
 
-std::vector<RayPair> NeighbouringPixels(const std::vector<Camera>& cameras, int64_t count,
-                                        uint64_t seed) {
+RayPairs NeighbouringPixels(const std::vector<Camera>& cameras, int64_t count, uint64_t seed) {
   REGRADE_CHECK(!cameras.empty());
-  std::vector<RayPair> pairs;
+  RayPairs pairs{.cameras = cameras};
   for (int64_t i = 0; i < count; ++i) {
     const Draw draw{seed, kNeighbourStream, i};
-    const Camera& camera = cameras[draw(0, static_cast<int>(cameras.size()))];
+    const int32_t index = draw(0, static_cast<int>(cameras.size()));
+    const Camera& camera = cameras[static_cast<size_t>(index)];
     const bool down = draw(1, 2) == 1;
     const int right = down ? 0 : 1, below = down ? 1 : 0;
     if (camera.width <= right || camera.height <= below) continue;
     const int x = draw(2, camera.width - right), y = draw(3, camera.height - below);
-    pairs.emplace_back(camera.PixelRay(x, y), camera.PixelRay(x + right, y + below));
+    pairs.AddPixel(index, x, y);
+    pairs.AddPixel(index, x + right, y + below);
   }
   return pairs;
 }
 
-std::vector<RayPair> PixelsOfOnePoint(const RadianceField& field,
-                                      const std::vector<Camera>& cameras, int64_t count,
-                                      uint64_t seed, const MarchOptions& march) {
-  if (cameras.size() < 2) return {};
-  const FieldView<float> view = ViewOf(field);
-  std::vector<RayPair> pairs;
-  for (int round = 0; round < kTries && std::ssize(pairs) < count; ++round) {
-    std::vector<std::optional<RayPair>> found(static_cast<size_t>(count));
-#pragma omp parallel for schedule(dynamic, 16)
+RayPairs PixelsOfOnePoint(const RadianceField& field, const std::vector<Camera>& cameras,
+                          int64_t count, uint64_t seed, const MarchOptions& march) {
+  RayPairs pairs{.cameras = cameras};
+  if (cameras.size() < 2) return pairs;
+  const std::unique_ptr<RayWeigher> weigher =
+      MakeRayWeigher(*field.geometry, field.near_clip, march, 0, kManyViews);
+  for (int round = 0; round < kTries && pairs.size() < 2 * count; ++round) {
+    ViewRays from{.cameras = cameras}, to{.cameras = cameras};
     for (int64_t i = 0; i < count; ++i) {
       const Draw draw{seed, kPointStream, round * count + i};
-      const int from = draw(0, static_cast<int>(cameras.size()));
-      const size_t to = (static_cast<size_t>(from) + 1) % cameras.size();
-      const Camera& camera = cameras[static_cast<size_t>(from)];
+      const int32_t index = draw(0, static_cast<int>(cameras.size()));
+      const Camera& camera = cameras[static_cast<size_t>(index)];
       const int x = draw(1, camera.width), y = draw(2, camera.height);
-      found[static_cast<size_t>(i)] = PairOfOnePoint(view, camera, cameras[to], x, y, march);
+      from.AddPixel(index, x, y);
     }
-    for (const std::optional<RayPair>& pair : found)
-      if (pair && std::ssize(pairs) < count) pairs.push_back(*pair);
+    const std::vector<double> depths = RayDepths(field, from, march, weigher.get());
+    std::vector<size_t> source;
+    std::vector<double> expected;
+    for (size_t i = 0; i < depths.size(); ++i) {
+      double depth = 0;
+      const auto place = PlaceInNext(cameras, from.places[i], depths[i], &depth);
+      if (!place) continue;
+      to.Add(place->camera, place->u, place->v);
+      source.push_back(i);
+      expected.push_back(depth);
+    }
+    const std::vector<double> seen = RayDepths(field, to, march, weigher.get());
+    for (size_t k = 0; k < seen.size() && pairs.size() < 2 * count; ++k) {
+      if (!(std::abs(seen[k] / expected[k] - 1) <= kDepthTolerance)) continue;
+      const ViewPlace &one = from.places[source[k]], &other = to.places[k];
+      pairs.Add(one.camera, one.u, one.v);
+      pairs.Add(other.camera, other.u, other.v);
+    }
   }
   return pairs;
 }

@@ -4,28 +4,26 @@
 #pragma once
 
 #include <cstdint>
-#include <utility>
 #include <vector>
 
 #include "kernels/field/radiance_field.h"
 #include "kernels/field/ray_march.h"
-#include "kernels/scene/camera.h"
+#include "kernels/scene/view_rays.h"
 
 namespace regrade {
 
-using RayPair = std::pair<Ray, Ray>;
+// Rays 2 i and 2 i + 1 are pair i.
+using RayPairs = ViewRays;
 
 // `count` pixels of random views with the one to the right of or below each.
-std::vector<RayPair> NeighbouringPixels(const std::vector<Camera>& cameras, int64_t count,
-                                        uint64_t seed);
+RayPairs NeighbouringPixels(const std::vector<Camera>& cameras, int64_t count, uint64_t seed);
 
 // At most `count` pairs: a pixel of a random view, and the ray of the next view, in the order
 // of `cameras` and from the last to the first, through the point that the pixel sees, see
 // EQ(geometric-flow). The point must lie in the next view's frame, and that ray's own depth be
 // within 1 % of the point's, as the evaluator asks. Rays that let more light pass than they
 // meet have no depth. Fewer than two cameras have no pairs. The same for any number of threads.
-std::vector<RayPair> PixelsOfOnePoint(const RadianceField& field,
-                                      const std::vector<Camera>& cameras, int64_t count,
-                                      uint64_t seed, const MarchOptions& march);
+RayPairs PixelsOfOnePoint(const RadianceField& field, const std::vector<Camera>& cameras,
+                          int64_t count, uint64_t seed, const MarchOptions& march);
 
 }  // namespace regrade

@@ -4,8 +4,8 @@
 
 #include "kernels/base/error.h"
 #include "kernels/base/random.h"
-#include "kernels/field/ray_weights.h"
 #include "kernels/field/trilinear.h"
+#include "kernels/render/ray_weigher.h"
 
 namespace regrade {
 
@@ -16,26 +16,31 @@ void AddResidualRays(const RadianceField& field, const Camera& camera, const Ima
   constexpr float kLeastWeight = 1e-4f;
   const double chosen =
       std::min(1.0, static_cast<double>(most) / static_cast<double>(missing.num_pixels()));
-  std::vector<Ray> some;
+  const bool splats = field.geometry->splats.on();
+  ViewRays some{.cameras = {camera}};
   for (int64_t i = 0; i < missing.num_pixels(); ++i) {
     if (!(RandomDouble(seed, 0, static_cast<uint64_t>(i)) < chosen)) continue;
     const float* p = &missing.pixels[static_cast<size_t>(3 * i)];
     const Vec3f lack{p[0], p[1], p[2]};
     if (!AllFinite(lack)) continue;
-    some.push_back(camera.PixelRay(static_cast<int>(i % missing.width),
-                                   static_cast<int>(i / missing.width)));
-    if (directions) directions->push_back(some.back().direction);
+    some.AddPixel(0, static_cast<int>(i % missing.width), static_cast<int>(i / missing.width));
+    if (directions && !splats) directions->push_back(some.rays.back().direction);
     rays->missing.push_back(lack);
     rays->share.push_back(static_cast<float>(1 / chosen));
   }
   constexpr int64_t kBand = 16384;
   const Geometry& geometry = *field.geometry;
-  std::vector<std::pair<int32_t, float>> row;
-  for (int64_t begin = 0; begin < std::ssize(some); begin += kBand) {
-    const int64_t count = std::min(kBand, std::ssize(some) - begin);
-    const RayWeights weights =
-        ComputeRayWeights(geometry, {some.data() + begin, count}, MarchOptions{field.step},
-                          field.near_clip, kLeastWeight);
+  const std::unique_ptr<RayWeigher> weigher =
+      MakeRayWeigher(geometry, field.near_clip, MarchOptions{field.step}, kLeastWeight);
+  struct Entry {
+    int32_t voxel;
+    float weight;
+    int64_t sample;
+  };
+  std::vector<Entry> row;
+  for (int64_t begin = 0; begin < some.size(); begin += kBand) {
+    const int64_t count = std::min(kBand, some.size() - begin);
+    const RayWeights weights = weigher->Weigh(some, begin, begin + count);
     for (int64_t r = 0; r < count; ++r) {
       row.clear();
       for (int64_t i = weights.first[static_cast<size_t>(r)];
@@ -45,17 +50,19 @@ void AddResidualRays(const RadianceField& field, const Camera& camera, const Ima
         CornerPoints(geometry, sample, points);
         for (int k = 0; k < 8; ++k)
           if (points[k] >= 0 && points[k] < geometry.num_voxels())
-            row.emplace_back(points[k], sample.weight * CornerWeight(sample.fraction, k));
+            row.push_back({points[k], sample.weight * CornerWeight(sample.fraction, k), i});
       }
       std::stable_sort(row.begin(), row.end(),
-                       [](const auto& a, const auto& b) { return a.first < b.first; });
+                       [](const Entry& a, const Entry& b) { return a.voxel < b.voxel; });
       for (size_t i = 0; i < row.size(); ++i) {
-        if (i > 0 && row[i].first == row[i - 1].first) {
-          rays->weight.back() += row[i].second;
+        if (i > 0 && row[i].voxel == row[i - 1].voxel) {
+          rays->weight.back() += row[i].weight;
           continue;
         }
-        rays->voxel.push_back(row[i].first);
-        rays->weight.push_back(row[i].second);
+        rays->voxel.push_back(row[i].voxel);
+        rays->weight.push_back(row[i].weight);
+        if (directions && splats)
+          directions->push_back(weights.directions[static_cast<size_t>(row[i].sample)]);
       }
       rays->first.push_back(std::ssize(rays->voxel));
     }

@@ -22,7 +22,8 @@ struct ResidualRays {
 };
 
 // Of a view's pixels `most` at random, all where it has no more; those whose `missing` [H, W,
-// 3] is not finite do not count. `directions`, if asked for, gets each ray's.
+// 3] is not finite do not count. `directions`, if asked for, gets each ray's, or of
+// splats one for each of `voxel`, see RayWeights::directions.
 void AddResidualRays(const RadianceField& field, const Camera& camera, const Image& missing,
                      int64_t most, uint64_t seed, ResidualRays* rays,
                      std::vector<Vec3f>* directions = nullptr);

@@ -2,11 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <span>
 
 #include "kernels/base/error.h"
-#include "kernels/field/ray_weights.h"
-#include "kernels/field/spherical_harmonics.h"
+#include "kernels/field/sample_basis.h"
 #include "kernels/field/trilinear.h"
+#include "kernels/render/ray_weigher.h"
 
 namespace regrade {
 namespace {
@@ -16,6 +17,7 @@ constexpr double kGammaNorm = 0.84628437532163443;  // sqrt(9 / (4 pi))
 struct Atom {
   int32_t voxel;
   double weight;
+  Vec3f direction;  // at which its colour is taken
 };
 
 // What one ray sees of the field before and after.
@@ -23,7 +25,7 @@ struct Seen {
   std::vector<Atom> atoms;                 // mu, front to back; weights sum to 1
   Vec3d source{}, styled{};                // as rendered
   Vec3d closed_source{}, closed_styled{};  // with mu for weights, nothing clamped
-  double gamma[kMaxBasis] = {};
+  Vec3f direction;                         // of the ray
   bool partial = false, on_sphere = false, transparent = false, clamped = false;
 };
 
@@ -47,13 +49,17 @@ class Observer {
 
   Seen Look(const Vec3f& direction, const RayWeights& weights, int64_t ray) const {
     Seen seen;
-    ShBasis(basis_, direction.Cast<double>(), seen.gamma);
+    seen.direction = direction;
+    SampleBasis<double> basis(basis_, direction.Cast<double>(), weights);
     const double left = weights.transmittance[ray];
     seen.source = source_.background.Cast<double>() * left;
     seen.styled = styled_.background.Cast<double>() * left;
     double inside_weight = 0;
     for (int64_t i = weights.first[ray]; i < weights.first[static_cast<size_t>(ray) + 1]; ++i) {
       const WeightedSample& sample = weights.samples[i];
+      const double* const gamma = basis.Of(i);
+      const Vec3f& own =
+          weights.directions.empty() ? direction : weights.directions[static_cast<size_t>(i)];
       Vec3d before{0.5, 0.5, 0.5}, after = before;
       int32_t points[8];
       CornerPoints(*source_.geometry, sample, points);
@@ -62,11 +68,11 @@ class Observer {
         const int32_t point = points[corner];
         const double fraction = CornerWeight(sample.fraction, corner);
         if (point < 0 || fraction == 0) continue;
-        before += ColorOf(source_.appearance, point, seen.gamma) * fraction;
-        after += ColorOf(styled_.appearance, point, seen.gamma) * fraction;
+        before += ColorOf(source_.appearance, point, gamma) * fraction;
+        after += ColorOf(styled_.appearance, point, gamma) * fraction;
         if (sample.on_sphere()) continue;
         seen.partial |= object_weights_ != nullptr && (*object_weights_)[point] < 1;
-        seen.atoms.push_back({point, fraction * sample.weight});
+        seen.atoms.push_back({point, fraction * sample.weight, own});
         inside_weight += fraction * sample.weight;
       }
       for (int c = 0; c < 3; ++c) {
@@ -78,20 +84,29 @@ class Observer {
     seen.transparent = !(inside_weight > 1 - kTransparentTransmittance);
     for (Atom& atom : seen.atoms) {
       atom.weight /= inside_weight;
-      seen.closed_source += ColorOf(source_.appearance, atom.voxel, seen.gamma) * atom.weight;
-      seen.closed_styled += ColorOf(styled_.appearance, atom.voxel, seen.gamma) * atom.weight;
+      double gamma[kMaxBasis];
+      ShBasis(basis_, atom.direction.Cast<double>(), gamma);
+      seen.closed_source += ColorOf(source_.appearance, atom.voxel, gamma) * atom.weight;
+      seen.closed_styled += ColorOf(styled_.appearance, atom.voxel, gamma) * atom.weight;
     }
     return seen;
   }
 
   // The right side of EQ(vrr-bound).
   double Bound(const Seen& a, const Seen& b) const {
-    double difference = 0;
-    for (int k = 0; k < basis_; ++k)
-      difference += (a.gamma[k] - b.gamma[k]) * (a.gamma[k] - b.gamma[k]);
+    const double moved = Transport(a, b, [&](const Atom& one, const Atom& other) {
+      return Distance(one.voxel, other.voxel);
+    });
+    const double turned =
+        source_.geometry->splats.on()
+            ? Transport(a, b,
+                        [&](const Atom& one, const Atom& other) {
+                          const double turn = Turn(one.direction, other.direction);
+                          return turn > 0 ? turn * ResidualNorm({&other, 1}) : 0;
+                        })
+            : Turn(a.direction, b.direction) * ResidualNorm(b.atoms);
     return base_norm_ * Norm(a.closed_source - b.closed_source) +
-           kGammaNorm * residual_bound_ * Transport(a, b) +
-           ResidualNorm(b) * std::sqrt(difference);
+           kGammaNorm * residual_bound_ * moved + turned;
   }
   // The mix of an object's style has the constant 1 - e + e K at most.
   double k() const {
@@ -122,12 +137,23 @@ class Observer {
     for (int i = 0; i < 3 * basis_; ++i) g[i] = styled_.appearance.sh[first + i] - mapped[i];
   }
 
-  double ResidualNorm(const Seen& seen) const {
-    double sum[3 * kMaxBasis] = {}, norm = 0;
-    for (const Atom& atom : seen.atoms) {
+  // |Gamma(d_1) - Gamma(d_2)|
+  double Turn(const Vec3f& one, const Vec3f& other) const {
+    double a[kMaxBasis], b[kMaxBasis], sum = 0;
+    ShBasis(basis_, one.Cast<double>(), a);
+    ShBasis(basis_, other.Cast<double>(), b);
+    for (int k = 0; k < basis_; ++k) sum += (a[k] - b[k]) * (a[k] - b[k]);
+    return std::sqrt(sum);
+  }
+
+  // Of the mean of g.
+  double ResidualNorm(std::span<const Atom> atoms) const {
+    double sum[3 * kMaxBasis] = {}, norm = 0, weight = 0;
+    for (const Atom& atom : atoms) weight += atom.weight;
+    for (const Atom& atom : atoms) {
       double g[3 * kMaxBasis];
       Residual(atom.voxel, g);
-      for (int i = 0; i < 3 * basis_; ++i) sum[i] += atom.weight * g[i];
+      for (int i = 0; i < 3 * basis_; ++i) sum[i] += atom.weight / weight * g[i];
     }
     for (int i = 0; i < 3 * basis_; ++i) norm += sum[i] * sum[i];
     return std::sqrt(norm);
@@ -145,8 +171,9 @@ class Observer {
     return std::sqrt(sum);
   }
 
-  // sum pi_jk |x_j - x_k| of the coupling in the order of light.
-  double Transport(const Seen& a, const Seen& b) const {
+  // sum pi_jk cost(j, k) of the coupling in the order of light.
+  template <typename Cost>
+  double Transport(const Seen& a, const Seen& b, const Cost& cost_of) const {
     double cost = 0, left_a = 0, left_b = 0;
     size_t i = 0, j = 0;
     while (true) {
@@ -159,7 +186,7 @@ class Observer {
         left_b = b.atoms[j++].weight;
       }
       const double moved = std::min(left_a, left_b);
-      if (moved > 0) cost += moved * Distance(a.atoms[i - 1].voxel, b.atoms[j - 1].voxel);
+      if (moved > 0) cost += moved * cost_of(a.atoms[i - 1], b.atoms[j - 1]);
       left_a -= moved;
       left_b -= moved;
     }
@@ -198,26 +225,24 @@ void Add(double source, double styled, double k, VarianceGroup* group) {
 }  // namespace
 
 VarianceReport MeasureVariance(const RadianceField& source, const RadianceField& styled,
-                               const LipschitzNetwork& network,
-                               const std::vector<RayPair>& pairs, const MarchOptions& march,
+                               const LipschitzNetwork& network, const RayPairs& pairs,
+                               const MarchOptions& march,
                                const std::vector<float>* object_weights) {
   if (object_weights != nullptr)
     REGRADE_CHECK_EQ(std::ssize(*object_weights), source.geometry->num_voxels());
-  std::vector<Ray> rays;
-  for (const RayPair& pair : pairs) rays.insert(rays.end(), {pair.first, pair.second});
-  const RayWeights weights = ComputeRayWeights(
-      *source.geometry, {rays.data(), std::ssize(rays)}, march, source.near_clip);
+  const RayWeights weights =
+      MakeRayWeigher(*source.geometry, source.near_clip, march)->Weigh(pairs);
   const Observer observer(source, styled, network, object_weights);
   struct Result {
     double source, styled, fraction;
     VarianceGroup VarianceReport::*group;
   };
-  std::vector<Result> results(pairs.size());
+  std::vector<Result> results(pairs.rays.size() / 2);
 #pragma omp parallel for schedule(dynamic, 16)
-  for (size_t i = 0; i < pairs.size(); ++i) {
+  for (size_t i = 0; i < results.size(); ++i) {
     const int64_t ray = 2 * static_cast<int64_t>(i);
-    const Seen a = observer.Look(pairs[i].first.direction, weights, ray);
-    const Seen b = observer.Look(pairs[i].second.direction, weights, ray + 1);
+    const Seen a = observer.Look(pairs.rays[2 * i].direction, weights, ray);
+    const Seen b = observer.Look(pairs.rays[2 * i + 1].direction, weights, ray + 1);
     Result& result = results[i];
     result = {Norm(a.source - b.source), Norm(a.styled - b.styled), 0, GroupOf(a, b)};
     if (result.group != &VarianceReport::valid) continue;

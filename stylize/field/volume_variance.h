@@ -11,6 +11,9 @@
 // Gamma_2); for any coupling pi of mu_1 and mu_2 the first is sum pi_jk (g_j - g_k) Gamma_1, at
 // most |Gamma| K_g sum pi_jk |x_j - x_k|. Here pi joins the rays' voxels in the order in which
 // light meets them, so the sum is W1's upper bound. |Gamma|^2 = 9 / (4 pi) for every direction.
+// Splats have directions d_rj of their own, see EQ(splat-color): in place of the last term is
+//   sum pi_jk |g_k| |Gamma(d_1j) - Gamma(d_2k)|,
+// to which a splat that both rays of one camera see adds nothing.
 //
 // The propositions say K vrr, K = |A| + K_g: that holds for A alone (Prop. 1 and 3), and for g
 // under Prop. 2's premise that the rays' weighted colours agree sample by sample, which
@@ -61,8 +64,8 @@ inline constexpr double kTransparentTransmittance = 1e-2;  // more than that is 
 // MixFields with them. Colours are as rendered, but not clipped to [0, 1]. Sums in double; the
 // result does not depend on the number of threads.
 VarianceReport MeasureVariance(const RadianceField& source, const RadianceField& styled,
-                               const LipschitzNetwork& network,
-                               const std::vector<RayPair>& pairs, const MarchOptions& march,
+                               const LipschitzNetwork& network, const RayPairs& pairs,
+                               const MarchOptions& march,
                                const std::vector<float>* object_weights = nullptr);
 
 }  // namespace regrade

@@ -6,6 +6,7 @@
 #include "kernels/field/cell_lattice.h"
 #include "kernels/field/spherical_harmonics.h"
 #include "stylize/field/lipschitz_network.h"
+#include "stylize/field/nearest_points.h"
 
 namespace regrade {
 namespace {
@@ -13,6 +14,13 @@ namespace {
 constexpr float kWidth = 0.2f;  // of colour, in units of white: s of EQ(voxel-residual)
 constexpr float kLeast = 0.1f;  // what voxels of different colours still tell each other
 constexpr int kLevels = 6;
+constexpr int kNearest = 6;          // splats
+constexpr float kPlacesAcross = 64;  // of the box, for cubes of splats
+
+void KeepEachOnce(std::vector<std::array<int32_t, 2>>* edges) {
+  std::sort(edges->begin(), edges->end());
+  edges->erase(std::unique(edges->begin(), edges->end()), edges->end());
+}
 
 void AddCellEdges(const CellGrid& cells, std::vector<std::array<int32_t, 2>>* edges) {
   for (int64_t c = 0; c < cells.num_cells(); ++c)
@@ -22,8 +30,31 @@ void AddCellEdges(const CellGrid& cells, std::vector<std::array<int32_t, 2>>* ed
         const int32_t a = cells.corner[8 * c + k], b = cells.corner[8 * c + (k | axis)];
         edges->push_back({std::min(a, b), std::max(a, b)});
       }
-  std::sort(edges->begin(), edges->end());
-  edges->erase(std::unique(edges->begin(), edges->end()), edges->end());
+  KeepEachOnce(edges);
+}
+
+void AddSplatEdges(const std::vector<Vec3f>& positions,
+                   std::vector<std::array<int32_t, 2>>* edges) {
+  const std::vector<int32_t> nearest = NearestPoints(positions, kNearest);
+  for (size_t i = 0; i < nearest.size(); ++i) {
+    const int32_t a = static_cast<int32_t>(i / kNearest), b = nearest[i];
+    if (b >= 0) edges->push_back({std::min(a, b), std::max(a, b)});
+  }
+  KeepEachOnce(edges);
+}
+
+// See EQ(splat-position); in the box's proportions: within [-2, 2].
+std::vector<Vec3f> SplatPositions(const RadianceField& field) {
+  const Vec3f& radius = field.geometry->frame.radius;
+  const float longest = std::max({radius.x, radius.y, radius.z});
+  std::vector<Vec3f> positions;
+  for (int64_t v = 0; v < field.geometry->num_voxels(); ++v) {
+    float row[kFeatureStride];
+    FillFeatures(field, 1, v, static_cast<int32_t>(v), row);
+    Vec3f& position = positions.emplace_back();
+    for (int a = 0; a < 3; ++a) position[a] = row[kNetworkSh + a] * radius[a] / longest;
+  }
+  return positions;
 }
 
 void AddGridEdges(const Geometry& geometry, const std::vector<int32_t>& vertex,
@@ -75,7 +106,13 @@ VoxelGraph GraphOf(const RadianceField& field) {
   const std::vector<int32_t> vertex = VertexOfVoxel(geometry);
   std::vector<Vec3i> places(vertex.size());
   const Vec3i n = geometry.frame.resolution;
-  if (geometry.cells.on()) {
+  if (geometry.splats.on()) {
+    const std::vector<Vec3f> positions = SplatPositions(field);
+    AddSplatEdges(positions, &graph.edges);
+    for (size_t v = 0; v < places.size(); ++v)
+      for (int a = 0; a < 3; ++a)
+        places[v][a] = static_cast<int32_t>((positions[v][a] + 2) * (kPlacesAcross / 2));
+  } else if (geometry.cells.on()) {
     AddCellEdges(geometry.cells, &graph.edges);
     for (size_t v = 0; v < places.size(); ++v)
       places[v] = PlaceOf(geometry.cells.vertex_key[static_cast<int64_t>(v)]);

@@ -12,7 +12,8 @@
 // d = 0.01 of white what counts as no difference; k_uv = 0.1 + exp(-|c_u - c_v|^2 / (2 s^2)),
 // s = 0.2, is less between voxels of different colours c: an edit ends where colours change,
 // and places that no picture sees follow their neighbours of like colour. e = 1e-6 leaves parts
-// that know nothing at 0.
+// that know nothing at 0. Of splats W_rv is w_v (see EQ(splat-composite)), and neighbours are
+// the nearest, see GraphOf.
 //
 // The clamp of a sample's colour is not part of E. A constant added at a voxel changes no slope
 // of the map of coefficients there: EQ(liprf-bound) holds for network and residual as for the

@@ -63,6 +63,10 @@ std::unique_ptr<StyleEngine> MakeCudaStyleEngine(const RadianceField* field,
                                                  const AggregationOptions& loss,
                                                  int64_t rays_per_step);
 
+// Where a field's style is trained if `asked` is: that of splats on the CPU, whatever renders
+// them.
+Backend BackendForStyle(Backend asked, const RadianceField& field);
+
 std::unique_ptr<StyleEngine> MakeStyleEngine(Backend backend, const RadianceField* field,
                                              const MarchOptions& march,
                                              const TrainNetworkOptions& options);

@@ -57,11 +57,15 @@ std::unique_ptr<StyleEngine> MakeCpuStyleEngine(const RadianceField* field,
   return std::make_unique<CpuStyleEngine>(field, loss);
 }
 
+Backend BackendForStyle(Backend asked, const RadianceField& field) {
+  return field.geometry->splats.on() ? Backend::kCpu : asked;
+}
+
 std::unique_ptr<StyleEngine> MakeStyleEngine(Backend backend, const RadianceField* field,
                                              const MarchOptions& march,
                                              const TrainNetworkOptions& options) {
   const AggregationOptions loss = LossOptions(options, march);
-  if (backend == Backend::kCpu) return MakeCpuStyleEngine(field, loss);
+  if (BackendForStyle(backend, *field) == Backend::kCpu) return MakeCpuStyleEngine(field, loss);
   return MakeCudaStyleEngine(field, loss, RaysPerStep(options.rays_per_step, options.patch));
 }
 

@@ -11,8 +11,16 @@
 namespace regrade {
 namespace {
 
-void AddPatch(const StyledTrainingView& view, int x0, int y0, int width, int height,
-              StyleRays* batch) {
+// Without rays.
+StyleRays BatchOf(const std::vector<StyledTrainingView>& views) {
+  StyleRays batch;
+  for (const StyledTrainingView& view : views) batch.cameras.push_back(view.camera);
+  return batch;
+}
+
+void AddPatch(const std::vector<StyledTrainingView>& views, size_t index, int x0, int y0,
+              int width, int height, StyleRays* batch) {
+  const StyledTrainingView& view = views[index];
   for (int y = y0; y < y0 + height; ++y)
     for (int x = x0; x < x0 + width; ++x) {
       const float* t = view.target->at(x, y);
@@ -22,7 +30,7 @@ void AddPatch(const StyledTrainingView& view, int x0, int y0, int width, int hei
       // Pictures are clipped to [0, 1], and so is what they are compared with.
       if (AllFinite(target))
         for (int c = 0; c < 3; ++c) target[c] = std::clamp(target[c], 0.0f, 1.0f);
-      batch->rays.push_back(view.camera.PixelRay(x, y));
+      batch->AddPixel(static_cast<int32_t>(index), x, y);
       batch->targets.push_back(target);
     }
 }
@@ -51,29 +59,29 @@ size_t InRandomOrder(size_t n, size_t place, uint64_t seed, uint64_t order) {
 StyleRays WholeViewRays(const std::vector<StyledTrainingView>& views, bool passes,
                         uint64_t seed, uint64_t step) {
   const size_t n = views.size();
-  const auto& view = views[passes ? InRandomOrder(n, step % n, seed, step / n)
-                                  : RandomIndex(seed, step, 0, n)];
-  const Part part = PartOf(view);
-  StyleRays batch;
-  AddPatch(view, part.x0, part.y0, part.width, part.height, &batch);
+  const size_t index =
+      passes ? InRandomOrder(n, step % n, seed, step / n) : RandomIndex(seed, step, 0, n);
+  const Part part = PartOf(views[index]);
+  StyleRays batch = BatchOf(views);
+  AddPatch(views, index, part.x0, part.y0, part.width, part.height, &batch);
   return batch;
 }
 
 StyleRays SampleStyleRays(const std::vector<StyledTrainingView>& views, int rays, int patch,
                           uint64_t seed, uint64_t step) {
-  StyleRays batch;
+  StyleRays batch = BatchOf(views);
   const int patches = std::max(1, rays / (patch * patch));
   for (int p = 0; p < patches; ++p) {
     const uint64_t counter = 3 * static_cast<uint64_t>(p);
-    const auto& view = views[RandomIndex(seed, step, counter, views.size())];
-    const Part part = PartOf(view);
+    const size_t index = RandomIndex(seed, step, counter, views.size());
+    const Part part = PartOf(views[index]);
     const int width = std::min(patch, part.width);
     const int height = std::min(patch, part.height);
     const int x0 = static_cast<int>(
         RandomIndex(seed, step, counter + 1, static_cast<uint64_t>(part.width - width + 1)));
     const int y0 = static_cast<int>(
         RandomIndex(seed, step, counter + 2, static_cast<uint64_t>(part.height - height + 1)));
-    AddPatch(view, part.x0 + x0, part.y0 + y0, width, height, &batch);
+    AddPatch(views, index, part.x0 + x0, part.y0 + y0, width, height, &batch);
   }
   return batch;
 }

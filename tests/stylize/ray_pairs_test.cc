@@ -34,26 +34,27 @@ RadianceField HardBall() {
 TEST(RayPairs, BothRaysEndAtOnePoint) {
   const RadianceField ball = HardBall();
   const std::vector<Camera> cameras = Ring(9, 60);  // 40 degrees apart
-  const std::vector<RayPair> pairs = PixelsOfOnePoint(ball, cameras, 1000, 3, MarchOptions{});
-  ASSERT_GT(pairs.size(), 500u);  // of 4000 pixels, two thirds on the ball
-  for (const RayPair& pair : pairs) {
-    const Vec3d a = EndOf(ball, pair.first), b = EndOf(ball, pair.second);
+  const RayPairs pairs = PixelsOfOnePoint(ball, cameras, 1000, 3, MarchOptions{});
+  ASSERT_GT(pairs.size(), 1000);  // of 4000 pixels, two thirds on the ball
+  for (size_t i = 0; i < pairs.rays.size(); i += 2) {
+    const Vec3d a = EndOf(ball, pairs.rays[i]), b = EndOf(ball, pairs.rays[i + 1]);
     // 1 % of a depth of at most 2.2, along the ray; a hidden point would be up to 1.5 apart
     EXPECT_LT(Norm(a - b), 0.03);
-    EXPECT_GT(Norm(pair.first.origin - pair.second.origin), 1);  // they are of two views
+    EXPECT_GT(Norm(pairs.rays[i].origin - pairs.rays[i + 1].origin),
+              1);  // they are of two views
   }
 }
 
 // A wall between two cameras: what one sees, the other does not.
 TEST(RayPairs, APointThatIsHiddenIsNoPair) {
   const std::vector<Camera> opposite{Ring(2, 60)};
-  EXPECT_EQ(PixelsOfOnePoint(HardBall(), opposite, 500, 3, MarchOptions{}).size(), 0u);
-  EXPECT_TRUE(PixelsOfOnePoint(HardBall(), {Ring(1, 60)}, 500, 3, MarchOptions{}).empty());
+  EXPECT_EQ(PixelsOfOnePoint(HardBall(), opposite, 500, 3, MarchOptions{}).size(), 0);
+  EXPECT_TRUE(PixelsOfOnePoint(HardBall(), {Ring(1, 60)}, 500, 3, MarchOptions{}).rays.empty());
   RadianceField empty = Ball(8);
   auto geometry = std::make_shared<Geometry>(*empty.geometry);
   for (int64_t i = 0; i < geometry->density.size(); ++i) geometry->density[i] = -1;
   empty.geometry = geometry;
-  EXPECT_TRUE(PixelsOfOnePoint(empty, Ring(9, 60), 500, 3, MarchOptions{}).empty());
+  EXPECT_TRUE(PixelsOfOnePoint(empty, Ring(9, 60), 500, 3, MarchOptions{}).rays.empty());
 }
 
 TEST(RayPairs, TheSameForAnyNumberOfThreads) {
@@ -61,14 +62,14 @@ TEST(RayPairs, TheSameForAnyNumberOfThreads) {
   const auto pairs = [&] {
     return PixelsOfOnePoint(ball, Ring(9, 60), 200, 5, MarchOptions{});
   };
-  const std::vector<RayPair> one = [&] {
+  const RayPairs one = [&] {
     const Threads single(1);
     return pairs();
   }();
-  const std::vector<RayPair> many = pairs();
+  const RayPairs many = pairs();
   ASSERT_EQ(one.size(), many.size());
-  for (size_t i = 0; i < one.size(); ++i)
-    EXPECT_EQ(Norm(one[i].second.direction - many[i].second.direction), 0);
+  for (size_t i = 0; i < one.rays.size(); ++i)
+    EXPECT_EQ(Norm(one.rays[i].direction - many.rays[i].direction), 0);
 }
 
 TEST(RayPairs, FractionalPlacesAndPixelsAgree) {
@@ -100,13 +101,13 @@ struct Surrounded {
   }
 };
 
-double RenderedDifference(const RadianceField& field, const std::vector<RayPair>& pairs) {
+double RenderedDifference(const RadianceField& field, const RayPairs& pairs) {
   double sum = 0;
-  for (const RayPair& pair : pairs) {
+  for (size_t i = 0; i < pairs.rays.size(); i += 2) {
     const auto color = [&](const Ray& ray) {
       return RenderRay(ViewOf(field), ray, MarchOptions{}).color.Cast<double>();
     };
-    sum += Norm(color(pair.first) - color(pair.second));
+    sum += Norm(color(pairs.rays[i]) - color(pairs.rays[i + 1]));
   }
   return sum;
 }
@@ -115,7 +116,7 @@ TEST(VolumeVariance, PairsOnSpheresAreAGroupAndDifferAsRendered) {
   Surrounded scene;
   AddSpheres(3, 8, 1.0, 4, &scene.source);
   scene.Style();
-  const std::vector<RayPair> pairs = NeighbouringPixels(scene.cameras, 2000, 3);
+  const RayPairs pairs = NeighbouringPixels(scene.cameras, 2000, 3);
   const VarianceReport report =
       MeasureVariance(scene.source, scene.styled, scene.network, pairs, MarchOptions{});
   EXPECT_EQ(report.Pairs(), 2000);
@@ -134,8 +135,7 @@ TEST(VolumeVariance, PairsOnSpheresAreAGroupAndDifferAsRendered) {
 TEST(VolumeVariance, PixelsOfOnePointStayBelowTheBound) {
   Surrounded scene;
   scene.Style();
-  const std::vector<RayPair> pairs =
-      PixelsOfOnePoint(scene.source, scene.cameras, 2000, 3, MarchOptions{});
+  const RayPairs pairs = PixelsOfOnePoint(scene.source, scene.cameras, 2000, 3, MarchOptions{});
   const VarianceReport report =
       MeasureVariance(scene.source, scene.styled, scene.network, pairs, MarchOptions{});
   EXPECT_GT(report.valid.pairs, 500);
@@ -156,7 +156,7 @@ TEST(VolumeVariance, AnObjectsBoundIsThatOfItsWholeVoxels) {
   }
   const RadianceField whole = scene.styled;
   scene.styled = MixFields(scene.source, {&whole}, {1}, &weights);
-  const std::vector<RayPair> pairs = NeighbouringPixels(scene.cameras, 3000, 3);
+  const RayPairs pairs = NeighbouringPixels(scene.cameras, 3000, 3);
   const VarianceReport report = MeasureVariance(scene.source, scene.styled, scene.network,
                                                 pairs, MarchOptions{}, &weights);
   EXPECT_GT(report.valid.pairs, 50);  // opaque, on the whole half

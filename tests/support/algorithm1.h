@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "kernels/field/ray_weights.h"
-#include "kernels/field/spherical_harmonics.h"
+#include "kernels/field/sample_basis.h"
 #include "kernels/field/trilinear.h"
 #include "stylize/field/lipschitz_network.h"
 #include "stylize/field/view_penalty.h"
@@ -50,8 +50,7 @@ T Algorithm1(const LipschitzNetwork& network, const RadianceField& field,
   // 1. from the loss to the image, and 2. from the image to the coefficients
   T loss = 0;
   for (int64_t r = 0; r < weights.num_rays(); ++r) {
-    T gamma[kMaxBasis] = {};
-    ShBasis(field.appearance.basis, directions[r], gamma);
+    SampleBasis<T> basis(field.appearance.basis, directions[r], weights);
     const int64_t first = weights.first[r];
     const int64_t last = weights.first[static_cast<size_t>(r) + 1];
     std::vector<Vec3<T>> raw(last - first);
@@ -61,6 +60,7 @@ T Algorithm1(const LipschitzNetwork& network, const RadianceField& field,
       const Vec3<T> fraction = sample.fraction.Cast<T>();
       int32_t points[8];
       CornerPoints(geometry, sample, points);
+      const T* const gamma = basis.Of(i);
       T blend[kNetworkSh] = {};
       for (int corner = 0; corner < 8; ++corner)
         for (int k = 0; k < kNetworkSh && points[corner] >= 0; ++k)
@@ -80,6 +80,7 @@ T Algorithm1(const LipschitzNetwork& network, const RadianceField& field,
     for (int64_t i = first; i < last; ++i) {
       const WeightedSample& sample = weights.samples[i];
       const Vec3<T> fraction = sample.fraction.Cast<T>();
+      const T* const gamma = basis.Of(i);
       int32_t points[8];
       CornerPoints(geometry, sample, points);
       for (int c = 0; c < 3; ++c) {

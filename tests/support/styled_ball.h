@@ -171,10 +171,11 @@ inline ColorMap SomeMap() {
 
 inline StyleRays SomeRays(int views, int size) {
   StyleRays batch;
-  for (const Camera& camera : Ring(views, size))
+  batch.cameras = Ring(views, size);
+  for (int32_t v = 0; v < views; ++v)
     for (int y = 0; y < size; ++y)
       for (int x = 0; x < size; ++x) {
-        batch.rays.push_back(camera.PixelRay(x, y));
+        batch.AddPixel(v, x, y);
         const uint64_t i = batch.rays.size();
         batch.targets.push_back({static_cast<float>(0.5 + 0.5 * Random(60, i)),
                                  static_cast<float>(0.5 + 0.5 * Random(61, i)),

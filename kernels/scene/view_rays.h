@@ -1,0 +1,31 @@
+// Rays through places of pictures: voxels are marched along the ray, splats are blended at the
+// place.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "kernels/scene/camera.h"
+
+namespace regrade {
+
+// A point of a camera's picture; pixel (x, y) has its centre at (x + 0.5, y + 0.5).
+struct ViewPlace {
+  int32_t camera;  // index
+  double u, v;     // pixels
+};
+
+struct ViewRays {
+  std::vector<Camera> cameras;
+  std::vector<Ray> rays;          // in the field's space, see Camera::FieldRay
+  std::vector<ViewPlace> places;  // [rays]
+
+  int64_t size() const { return std::ssize(rays); }
+  void Add(int32_t camera, double u, double v) {
+    rays.push_back(cameras[static_cast<size_t>(camera)].FieldRay(u, v));
+    places.push_back({camera, u, v});
+  }
+  void AddPixel(int32_t camera, int x, int y) { Add(camera, x + 0.5, y + 0.5); }
+};
+
+}  // namespace regrade

@@ -1,0 +1,362 @@
+// LipRF of splats: gradient, training, objects, residual, and what is measured of pairs.
+#include <omp.h>
+
+#include "stylize/field/blend_fields.h"
+#include "stylize/field/coefficient_fit.h"
+#include "stylize/field/object_weights.h"
+#include "stylize/field/ray_pairs.h"
+#include "stylize/field/volume_variance.h"
+#include "stylize/field/voxel_residual.h"
+#include "stylize/training/restyle_field.h"
+#include "tests/support/algorithm1.h"
+#include "tests/support/expect_error.h"
+#include "tests/support/record_error.h"
+#include "tests/support/splat_ball.h"
+
+namespace regrade {
+namespace {
+
+using namespace testing;  // NOLINT: a test
+
+// --- gradient
+
+double PlainGradient(const LipschitzNetwork& network, const RadianceField& field,
+                     const StyleRays& batch, double scale, double view_weight,
+                     std::vector<double>* gradient) {
+  const RayWeights weights =
+      MakeRayWeigher(*field.geometry, field.near_clip, MarchOptions{})->Weigh(batch);
+  std::vector<Vec3d> directions(batch.rays.size()), targets;  // splats have their own
+  for (const Vec3f& target : batch.targets) targets.push_back(target.Cast<double>());
+  DenseNetwork<double> d_effective;
+  for (int l = 0; l < kNetworkLayers; ++l)
+    d_effective.layers.emplace_back(LipschitzNetwork::Outputs(l), LipschitzNetwork::Inputs(l));
+  const double loss = Algorithm1<double>(network, field, weights, directions, targets, scale,
+                                         view_weight, &d_effective);
+  if (gradient != nullptr) network.AddGradient(d_effective, gradient);
+  return loss;
+}
+
+std::vector<double> NoGradient() {
+  return std::vector<double>(static_cast<size_t>(LipschitzNetwork::NumParameters()));
+}
+
+LipschitzNetwork BasedNetwork(uint64_t stream) {
+  LipschitzNetwork network = RandomNetwork(stream);
+  network.data().has_base = true;
+  network.data().base = SomeMap();
+  return network;
+}
+
+TEST(SplatStyle, GradientAgainstRichardson) {
+  const RadianceField field = SplatBall(60, 0.3f);
+  const StyleRays batch = SomeRays(2, 6);
+  LipschitzNetwork network = BasedNetwork(90);
+  network.data().base.offset = {0.2, 0.2, 0.2};  // no clamp begins or ends within a step
+  for (int l = 0; l < kNetworkLayers; ++l) {
+    const int64_t first = network.weight(l) - network.weight(0);
+    const int64_t bias = network.bias(l) - network.weight(0);
+    for (const int64_t at : {first + 37, bias + 3, &network.k(l) - network.weight(0)}) {
+      float& value = network.data().parameters[static_cast<size_t>(at)];
+      const float before = value = std::ldexp(std::round(std::ldexp(value, 14)), -14);
+      std::vector<double> analytic = NoGradient();
+      PlainGradient(network, field, batch, 1.0, 0.7, &analytic);
+      const auto central = [&](float h) {
+        value = before + h;
+        const double plus = PlainGradient(network, field, batch, 1.0, 0.7, nullptr);
+        value = before - h;
+        const double minus = PlainGradient(network, field, batch, 1.0, 0.7, nullptr);
+        value = before;
+        return (plus - minus) / (2 * static_cast<double>(h));
+      };
+      const double h0 = central(0x1p-8f), h1 = central(0x1p-9f), h2 = central(0x1p-10f);
+      const double r0 = (4 * h1 - h0) / 3, r1 = (4 * h2 - h1) / 3;
+      const double numeric = (16 * r1 - r0) / 15, is = analytic[static_cast<size_t>(at)];
+      EXPECT_NEAR(
+          is, numeric,
+          RecordDigits("gradient of splats through sigma, W, b and K", Computed::kDouble,
+                       is - numeric, 2e-8, std::max(1.0, std::abs(numeric))))
+          << "layer " << l;
+    }
+  }
+}
+
+TEST(SplatStyle, EqualsAlgorithm1) {
+  const RadianceField field = SplatBall(3000);
+  const StyleRays batch = SomeRays(1, 30);
+  const LipschitzNetwork network = BasedNetwork(91);
+  std::vector<double> gradient = NoGradient(), expected = NoGradient();
+  const AggregationResult result =
+      GradientAggregation(field, {.view_weight = 0.7}).Run(network, batch, &gradient);
+  EXPECT_GT(result.touched_voxels, 100);
+  EXPECT_LT(result.touched_voxels, 3000);
+  const double scale = 1 / (3.0 * static_cast<double>(batch.rays.size()));
+  const double loss = PlainGradient(network, field, batch, scale, 0.7, &expected);
+  EXPECT_NEAR(result.loss, loss, 1e-5 * loss);
+  EXPECT_LE(RelativeDifference(gradient, expected),
+            RecordDigits("gradient of splats", Computed::kFloat,
+                         RelativeDifference(gradient, expected), 1e-5));
+}
+
+TEST(SplatStyle, ThreadsDoNotChangeABit) {
+  const RadianceField field = SplatBall(500);
+  const StyleRays batch = SomeRays(3, 20);
+  const LipschitzNetwork network = BasedNetwork(94);
+  std::vector<double> gradient[2] = {NoGradient(), NoGradient()};
+  for (int t = 0; t < 2; ++t) {
+    const Threads threads(t == 0 ? 1 : 5);
+    GradientAggregation(field, {}).Run(network, batch, &gradient[t]);
+  }
+  EXPECT_TRUE(
+      RecordSameBits("splats, 1 and 5 threads", Computed::kFloat, gradient[0] == gradient[1]));
+}
+
+// --- training
+
+SceneColorMap MapOf(const StyledSplats& ball) {
+  StyleRays all;
+  for (size_t v = 0; v < ball.views.size(); ++v) {
+    all.cameras.push_back(ball.views[v].camera);
+    const Image& target = ball.targets[v];
+    for (int y = 0; y < target.height; ++y)
+      for (int x = 0; x < target.width; ++x) {
+        const float* t = target.at(x, y);
+        all.AddPixel(static_cast<int32_t>(v), x, y);
+        all.targets.push_back({t[0], t[1], t[2]});
+        if (*ball.masks[v].at(x, y) < 0.5f) all.targets.back().x = std::nanf("");
+      }
+  }
+  SceneColorMap result;
+  result.map = LeastSquaresMap(ball.field, all, {.max_transmittance = 0.5f});
+  result.k_est = SpectralNorm(result.map.matrix);
+  return result;
+}
+
+TEST(SplatStyle, LeastSquaresFindALinearStyle) {
+  const StyledSplats ball(800, 4, 40, LinearStyle);
+  const ColorMap map = MapOf(ball).map;
+  const Vec3f gray = LinearStyle({0, 0, 0}), red = LinearStyle({1, 0, 0});
+  for (int c = 0; c < 3; ++c) {
+    EXPECT_NEAR(map.offset[c], gray[c], 5e-3);
+    EXPECT_NEAR(map.matrix(c, 0), red[c] - gray[c], 5e-3);
+  }
+}
+
+TEST(SplatStyle, TrainingBeatsTheLinearMap) {
+  const StyledSplats ball(800, 6, 40, CurvedStyle);
+  TrainNetworkOptions options;
+  options.steps = 120;
+  options.rays_per_step = 512;
+  const TrainNetworkResult result =
+      TrainNetwork(ball.field, ball.views, MapOf(ball), {}, options, {});
+  EXPECT_GT(result.psnr_db, result.linear_map_psnr_db + 3);
+  EXPECT_LE(result.bound, 4 * result.k_est * (1 + 1e-9));
+  EXPECT_LE(result.local_lipschitz_sampled, result.bound);
+  // What was learned is what the renderer shows.
+  RadianceField styled = ball.field;
+  styled.appearance = ApplyNetwork(result.network, ball.field);
+  const FieldRenderer renderer(styled, Backend::kCpu);
+  double sum = 0, count = 0;
+  for (size_t v = 0; v < ball.views.size(); ++v) {
+    const Image shown = renderer.Render(ball.views[v].camera).color;
+    for (size_t i = 0; i < shown.pixels.size(); ++i) {
+      if (ball.masks[v].pixels[i / 3] < 0.5f) continue;
+      sum += std::pow(
+          double{shown.pixels[i]} - double{std::clamp(ball.targets[v].pixels[i], 0.0f, 1.0f)},
+          2);
+      ++count;
+    }
+  }
+  EXPECT_NEAR(-10 * std::log10(sum / count), result.psnr_db, 2);
+}
+
+// On a device, too: until it learns of splats, the CPU trains, and says so.
+TEST(SplatStyle, AFieldIsRestyledWhateverIsAskedFor) {
+  const StyledSplats ball(400, 3, 32, LinearStyle);
+  TrainingTargets targets;
+  for (size_t v = 0; v < ball.views.size(); ++v)
+    targets.Add(ball.views[v], ball.photos[v], ball.targets[v], ball.masks[v]);
+  std::vector<float> half(static_cast<size_t>(ball.field.geometry->num_voxels()));
+  std::fill_n(half.begin(), 200, 1.0f);
+  RestyleRequest request;
+  request.options.steps = 20;
+  request.options.rays_per_step = 256;
+  request.object_weights = &half;
+  request.backend = Backend::kCuda;
+  const RestyledField restyled = Restyle(ball.field, targets, request, {});
+  ASSERT_EQ(restyled.notices.size(), 1u);
+  EXPECT_NE(restyled.notices[0].find("CPU"), std::string::npos);
+  EXPECT_EQ(restyled.styled.geometry, ball.field.geometry);
+  int64_t changed[2] = {};
+  for (int64_t i = 0; i < ball.field.appearance.sh.size(); ++i)
+    changed[i / (200 * 27)] +=
+        restyled.styled.appearance.sh[i] != restyled.source.appearance.sh[i];
+  EXPECT_GT(changed[0], 5000);
+  EXPECT_EQ(changed[1], 0);
+}
+
+// --- objects
+
+// What masks of rendered truth call the upper half, splats of the upper half are.
+TEST(SplatStyle, MasksVoteForTheirSplats) {
+  const RadianceField field = SplatBall(600);
+  const int64_t n = field.geometry->num_voxels();
+  const auto height = [&](int64_t v) { return field.geometry->splats.mean[3 * v + 2]; };
+  std::vector<float> upper(static_cast<size_t>(n));
+  for (int64_t v = 0; v < n; ++v) upper[static_cast<size_t>(v)] = height(v) > 0;
+  const FieldRenderer truth(WeightField(field, upper), Backend::kCpu);
+  MaskVote vote(*field.geometry, field.near_clip, MarchOptions{});
+  for (const Camera& camera : Ring(8, 48)) {
+    const Image color = truth.Render(camera).color;
+    Image mask(camera.width, camera.height, 1);
+    for (size_t i = 0; i < mask.pixels.size(); ++i)
+      mask.pixels[i] = color.pixels[3 * i] > 0.5f ? 1.0f : 0.0f;
+    vote.Add(camera, mask);
+  }
+  const std::vector<float> weights = vote.Weights(0.5, 0.25);
+  int64_t clear = 0, wrong = 0;
+  for (int64_t v = 0; v < n; ++v) {
+    if (std::abs(height(v)) < 0.15f) continue;  // splats are up to 0.1 wide
+    ++clear;
+    wrong += (weights[static_cast<size_t>(v)] > 0.5f) != (height(v) > 0);
+  }
+  EXPECT_GT(clear, 400);
+  EXPECT_LT(wrong, clear / 20);  // those that no ray sees have weight 0
+}
+
+TEST(SplatStyle, StylesOfOtherSplatsAreNotMixed) {
+  const RadianceField field = SplatBall(50);
+  RadianceField other = field;
+  auto moved = std::make_shared<Geometry>(*field.geometry);
+  moved->splats.opacity_logit[7] += 0.1f;
+  other.geometry = moved;
+  EXPECT_FALSE(SameGeometry(*field.geometry, *other.geometry));
+  EXPECT_TRUE(SameGeometry(*field.geometry, Geometry(*field.geometry)));
+}
+
+// --- residual
+
+double SquaredError(const RadianceField& field, const std::vector<Camera>& cameras,
+                    const std::vector<Image>& wanted) {
+  const FieldRenderer renderer(field, Backend::kCpu);
+  double sum = 0;
+  for (size_t v = 0; v < cameras.size(); ++v) {
+    const Image shown = renderer.Render(cameras[v]).color;
+    for (size_t i = 0; i < shown.pixels.size(); ++i)
+      sum += std::pow(double{shown.pixels[i]} - double{wanted[v].pixels[i]}, 2);
+  }
+  return sum;
+}
+
+// A ball in gentle colours, and pictures of it with one side brighter.
+struct Edited {
+  RadianceField field = SplatBall(600, 0.3f);
+  std::vector<Camera> cameras = Ring(6, 40);
+  std::vector<Image> wanted, missing;
+
+  Edited() {
+    RadianceField edited = field;
+    for (int64_t v = 0; v < field.geometry->num_voxels(); ++v)
+      for (int c = 0; c < 3; ++c)
+        if (field.geometry->splats.mean[3 * v] > 0)
+          edited.appearance.sh[27 * v + 9 * c] += 0.5f;
+    const FieldRenderer before(field, Backend::kCpu), after(edited, Backend::kCpu);
+    for (const Camera& camera : cameras) {
+      wanted.push_back(after.Render(camera).color);
+      missing.push_back(wanted.back());
+      const Image shown = before.Render(camera).color;
+      for (size_t i = 0; i < shown.pixels.size(); ++i)
+        missing.back().pixels[i] -= shown.pixels[i];
+    }
+  }
+};
+
+TEST(SplatStyle, AResidualShowsAnEdit) {
+  const Edited scene;
+  const VoxelGraph graph = GraphOf(scene.field);
+  const int64_t n = scene.field.geometry->num_voxels();
+  EXPECT_EQ(graph.voxels, n);
+  for (int64_t v = 0; v < n; ++v)
+    EXPECT_GE(
+        graph.first_edge[static_cast<size_t>(v) + 1] - graph.first_edge[static_cast<size_t>(v)],
+        6);
+  EXPECT_LT(std::ssize(graph.edges), 5 * n);
+  ResidualRays rays;
+  for (size_t v = 0; v < scene.cameras.size(); ++v)
+    AddResidualRays(scene.field, scene.cameras[v], scene.missing[v], 1 << 20, 0, &rays);
+  const auto fit = [&](int threads) {
+    const Threads some(threads);
+    return FitResidual(graph, rays, {});
+  };
+  const std::vector<Vec3d> x = fit(1), again = fit(5);
+  for (size_t v = 0; v < x.size(); ++v) ASSERT_TRUE(x[v] == again[v]) << v;
+  // The edit is a constant of 0.5 Gamma_0 = 0.14 on one side.
+  double sides[2] = {}, count[2] = {};
+  for (int64_t v = 0; v < n; ++v) {
+    const float side = scene.field.geometry->splats.mean[3 * v];
+    if (std::abs(side) < 0.2f) continue;
+    sides[side > 0] += x[static_cast<size_t>(v)].x, ++count[side > 0];
+  }
+  EXPECT_NEAR(sides[1] / count[1], 0.141, 0.01);
+  EXPECT_NEAR(sides[0] / count[0], 0, 0.01);
+  RadianceField fitted = scene.field;
+  VoxelResidual residual;
+  for (const Vec3d& color : x) residual.color.push_back(color.Cast<float>());
+  AddResidual(residual, &fitted.appearance);
+  EXPECT_LT(SquaredError(fitted, scene.cameras, scene.wanted),
+            0.03 * SquaredError(scene.field, scene.cameras, scene.wanted));
+}
+
+TEST(SplatStyle, CoefficientsFitOtherPictures) {
+  const Edited scene;
+  RadianceField other = scene.field;
+  for (int64_t i = 0; i < other.appearance.sh.size(); ++i)
+    other.appearance.sh[i] += static_cast<float>(0.1 * Random(96, static_cast<uint64_t>(i)));
+  const FieldRenderer before(scene.field, Backend::kCpu), after(other, Backend::kCpu);
+  std::vector<Image> wanted, missing;
+  for (const Camera& camera : scene.cameras) {
+    wanted.push_back(after.Render(camera).color);
+    missing.push_back(wanted.back());
+    const Image shown = before.Render(camera).color;
+    for (size_t i = 0; i < shown.pixels.size(); ++i)
+      missing.back().pixels[i] -= shown.pixels[i];
+  }
+  const auto fit = [&](int threads) {
+    const Threads some(threads);
+    return FitCoefficients(scene.field, scene.cameras, missing, {.steps = 20});
+  };
+  const RadianceField fitted = fit(1), again = fit(5);
+  for (int64_t i = 0; i < fitted.appearance.sh.size(); ++i)
+    ASSERT_EQ(fitted.appearance.sh[i], again.appearance.sh[i]);
+  EXPECT_LT(SquaredError(fitted, scene.cameras, wanted),
+            1e-2 * SquaredError(scene.field, scene.cameras, wanted));
+}
+
+// --- pairs
+
+TEST(SplatStyle, PairsStayBelowTheirBound) {
+  const RadianceField source = SplatBall(2500, 0.15f);
+  LipschitzNetwork network = RandomNetwork(301, 0.9);
+  network.data().has_base = true;
+  network.data().base = SomeMap();
+  network.data().base.offset = {0.1, 0.05, 0.1};
+  RadianceField styled = source;
+  styled.appearance = ApplyNetwork(network, source);
+  const std::vector<Camera> cameras = Ring(9, 60);
+  const RayPairs neighbours = NeighbouringPixels(cameras, 2000, 3),
+                 points = PixelsOfOnePoint(source, cameras, 2000, 3, {});
+  EXPECT_EQ(neighbours.size(), 4000);
+  EXPECT_GT(points.size(), 500);
+  for (size_t i = 0; i < points.rays.size(); i += 2)
+    EXPECT_NE(points.places[i].camera, points.places[i + 1].camera);
+  for (const RayPairs& pairs : {neighbours, points}) {
+    const VarianceReport report = MeasureVariance(source, styled, network, pairs, {});
+    EXPECT_GT(report.valid.pairs, 200);
+    EXPECT_GT(report.largest_fraction, 0.05);
+    EXPECT_LE(report.largest_fraction, 1 + 1e-4);  // float's rounding of coefficients
+  }
+  const Threads single(1);
+  EXPECT_EQ(PixelsOfOnePoint(source, cameras, 2000, 3, {}).size(), points.size());
+}
+
+}  // namespace
+}  // namespace regrade
