@@ -41,7 +41,7 @@ struct SplatEffort {
 const SplatEffort kSplatEfforts[] = {
     {"smoke", false, 150, 5},      {"draft", false, 1300, 40},  {"standard", false, 2500, 100},
     {"best", false, 4000, 250},    {"smoke", true, 300, 10},    {"draft", true, 4000, 200},
-    {"standard", true, 8000, 500}, {"best", true, 15000, 1000},
+    {"standard", true, 7500, 500}, {"best", true, 10000, 1000},
 };
 
 void UseSplatEffort(const std::string& preset, bool on_card, SplatFitOptions* splats) {

@@ -42,6 +42,11 @@ struct SceneOptions {
     box.Describe(bind);
   }
   bool UsesSplats() const { return field == "splats"; }
+  // The effects that were asked for, and none that this kind of field needs not: splats lie in
+  // the world, far ones too.
+  std::string EffectsOf(const std::string& asked) const {
+    return asked + (UsesSplats() ? ",ndc=off,background=off" : "");
+  }
 };
 
 struct StyleSource {
@@ -164,11 +169,7 @@ struct RunSettings {
   // Under the headings of the help.
   void Bind(OptionSet* options);
 
-  // `run.effects`, and what the kind of field needs none of: splats lie in the world, far ones
-  // too.
-  std::string Effects() const {
-    return run.effects + (scene.UsesSplats() ? ",ndc=off,background=off" : "");
-  }
+  std::string Effects() const { return scene.EffectsOf(run.effects); }
   int sh_degree() const { return scene.UsesSplats() ? splats.sh_degree : fit.sh_degree; }
 };
 

@@ -175,7 +175,7 @@ const VariantRunner::Photos& VariantRunner::PhotosAt(int size) {
   // The box does not depend on exposures, which are known already.
   p.scene =
       ProfileScene(p.working_views.capture(), base_->settings.fit.sh_degree,
-                   base_->settings.run.effects + ",exposure=off", base_->settings.scene.box)
+                   base_->settings.Effects() + ",exposure=off", base_->settings.scene.box)
           .scene;
   p.working_views = p.working_views.InField(p.scene.field_from_world, p.scene.ndc);
   const std::vector<int> fitted = p.working_views.Training();

@@ -107,13 +107,13 @@ TEST(Plan, TooLittleMemoryIsAWarningThatNamesTheReason) {
   }
 }
 
-// 40 photos of 100 x 100 pixels, 10 thousand splats of 38 floats with two moments each.
+// 40 photos of 300 x 300 pixels, 100 thousand splats of 38 floats with two moments each.
 TEST(Plan, SplatsAreLoweredToMemory) {
   SplatFitOptions asked;
   asked.thousands = 100, asked.sh_degree = 2, asked.steps = 100;
-  const FitPlace place{.pixels = 400000, .photos = 40};
+  const FitPlace place{.pixels = 3600000, .photos = 40};
   EXPECT_EQ(SplatsWithinMemory(asked, place).options.thousands, 100);
-  const uint64_t memory = PlanSplatFit(asked, 400000, 40, 2).memory;
+  const uint64_t memory = PlanSplatFit(asked, 3600000, 40, 2).memory;
   EXPECT_GT(memory, 100000u * 3 * 38 * 4);
   FitPlace less = place;
   less.max_memory_gb = 0.9e-9 * static_cast<double>(memory);
@@ -123,11 +123,11 @@ TEST(Plan, SplatsAreLoweredToMemory) {
   EXPECT_NE(lowered.notice, "");
 }
 
-// A splat for each four pixels is enough.
+// A splat for each 30 pixels is enough.
 TEST(Plan, FewPixelsHaveFewSplats) {
   SplatFitOptions asked;
   asked.thousands = 100;
-  EXPECT_EQ(SplatsWithinMemory(asked, {.pixels = 200000, .photos = 4}).options.thousands, 50);
+  EXPECT_EQ(SplatsWithinMemory(asked, {.pixels = 600000, .photos = 4}).options.thousands, 20);
 }
 
 TEST(Plan, DeviceMemoryByHand) {
