@@ -44,6 +44,9 @@ class Painter {
   // One step of work; false if there is none.
   step() {
     const begun = performance.now();
+    // Splats are drawn in the last order that there is, until they are in that of the view.
+    const order = this.scene.orderFor?.(this.pictureOf(this.full.width, this.full.height).view, () => this.change());
+    if (order && !order.any) return true;
     if (this.changed) {
       this.changed = false;
       const width = Math.max(16, Math.round(this.full.width * this.part));
@@ -64,7 +67,7 @@ class Painter {
       return true;
     }
     if (this.next >= this.full.height) return false;
-    if (begun < this.rest) return true;
+    if (begun < this.rest || order && !order.exact) return true;
     const height = Math.min(this.rows, this.full.height - this.next);
     const strip = {y: this.full.height - this.next - height, height};  // from the top
     this.draw(this.full, strip, this.steps.rest);
