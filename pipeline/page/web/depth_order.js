@@ -4,7 +4,7 @@
 // they do, in three passes of 11 bits; of equal ones the last comes first.
 function depthSorter(points) {
   const n = points.length / 3, depth = new Float32Array(n), key = new Uint32Array(depth.buffer), count = new Uint32Array(2048);
-  let from = new Uint32Array(n), to = new Uint32Array(n);
+  let from = new Int32Array(n), to = new Int32Array(n);
   return ([x, y, z], along, near) => {
     let seen = 0;
     for (let i = 0; i < n; ++i) {

@@ -68,7 +68,8 @@ class Painter {
     }
     if (this.next >= this.full.height) return false;
     if (begun < this.rest || order && !order.exact) return true;
-    const height = Math.min(this.rows, this.full.height - this.next);
+    // Of splats each strip costs a look at all of them.
+    const height = Math.min(order ? Math.max(this.rows, this.full.height >> 1) : this.rows, this.full.height - this.next);
     const strip = {y: this.full.height - this.next - height, height};  // from the top
     this.draw(this.full, strip, this.steps.rest);
     this.graphics.settle(this.full);

@@ -1,5 +1,7 @@
 // A scene of splats on the graphics processor: seen once for each view, and blended back to front.
 
+const QUADS = 1024;  // of an instance, since software draws instances one by one; blend_splats.glsl's, too
+
 const RESOLVE = `#version 300 es
 precision highp float;
 uniform sampler2D uPicture;
@@ -30,14 +32,12 @@ class SplatScene {
     this.source = {color: this.color, code: header.color, texelScale: [1, 1, 1], background: header.background};
     this.kept = {place: new Blob([made.place]), earlier: new Blob([made.earlier])};
     this.sorter = new DepthOrder(made.points);
+    this.order = graphics.blank('i1', this.mean.height);
     this.array = gl.createVertexArray();
-    this.order = graphics.taken({buffer: gl.createBuffer(), bytes: 4 * voxels});
     gl.bindVertexArray(this.array);
-    gl.bindBuffer(gl.ARRAY_BUFFER, this.order.buffer);
-    gl.bufferData(gl.ARRAY_BUFFER, 4 * voxels, gl.DYNAMIC_DRAW);
-    gl.enableVertexAttribArray(0);
-    gl.vertexAttribIPointer(0, 1, gl.UNSIGNED_INT, 0, 0);
-    gl.vertexAttribDivisor(0, 1);
+    gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, this.corners = gl.createBuffer());
+    const corners = Uint16Array.from({length: 6 * QUADS}, (_, i) => 4 * Math.floor(i / 6) + [0, 1, 2, 2, 1, 3][i % 6]);
+    gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, corners, gl.STATIC_DRAW);
     this.framebuffer = gl.createFramebuffer();
     gl.bindFramebuffer(gl.FRAMEBUFFER, this.framebuffer);
     this.seen.forEach(({texture}, i) => gl.framebufferTexture2D(gl.FRAMEBUFFER, gl.COLOR_ATTACHMENT0 + i, gl.TEXTURE_2D, texture, 0));
@@ -47,16 +47,15 @@ class SplatScene {
   free() {
     const gl = this.graphics.gl;
     this.sorter.end();
-    [this.mean, this.shape, this.color, ...this.seen].forEach((texture) => this.graphics.free(texture));
-    this.graphics.freeBuffer(this.order);
+    this.parts.forEach((texture) => this.graphics.free(texture));
+    gl.deleteBuffer(this.corners);
     gl.deleteVertexArray(this.array);
     gl.deleteFramebuffer(this.framebuffer);
   }
   // A promise: until something else is awaited, what is drawn next is in the order of this view.
   async arrange(view) {
-    const order = await this.sorter.of(view, this.header.splats.near_plane), gl = this.graphics.gl;
-    gl.bindBuffer(gl.ARRAY_BUFFER, this.order.buffer);
-    gl.bufferSubData(gl.ARRAY_BUFFER, 0, order);
+    const order = await this.sorter.of(view, this.header.splats.near_plane);
+    this.graphics.write(this.order, order);
     this.ordered = {count: order.length, view: JSON.stringify([view.rotation, view.eye])};
   }
   // Whether there is an order, and whether it is this view's; if not, it will be, and `then` is called.
@@ -101,6 +100,9 @@ class SplatScene {
     gl.useProgram(blend.program);
     gl.bindVertexArray(this.array);
     this.seen.forEach((texture, i) => this.graphics.bind(blend, ['uPlace', 'uLight'][i], i, texture));
+    this.graphics.bind(blend, 'uOrder', 2, this.order);
+    const count = this.ordered?.count ?? 0;
+    gl.uniform1i(blend.at('uCount'), count);
     const top = target.height - strip.y - strip.height;
     gl.uniform2f(blend.at('uSize'), target.width, target.height);
     gl.uniform4f(blend.at('uStrip'), strip.x, strip.x + strip.width, top, top + strip.height);
@@ -111,7 +113,7 @@ class SplatScene {
     gl.clearBufferfv(gl.COLOR, 0, [...background, 1]);
     gl.enable(gl.BLEND);
     gl.blendFunc(gl.ONE, gl.ONE_MINUS_SRC_ALPHA);
-    gl.drawArraysInstanced(gl.TRIANGLE_STRIP, 0, 4, this.ordered?.count ?? 0);
+    gl.drawElementsInstanced(gl.TRIANGLES, 6 * QUADS, gl.UNSIGNED_SHORT, 0, Math.ceil(count / QUADS));
     gl.disable(gl.BLEND);
     if (sum !== target) {
       gl.useProgram(resolve.program);
