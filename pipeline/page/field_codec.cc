@@ -34,7 +34,7 @@ PageVoxels RecordsInPageOrder(const PageField& page, const Geometry& geometry) {
 }
 
 std::vector<float> ColorWeights(const Geometry& geometry) {
-  return geometry.splats.on() ? OpacityOfSplats(geometry) : OpacityOfVoxels(geometry);
+  return geometry.splats.on() ? LightOfSplats(geometry) : OpacityOfVoxels(geometry);
 }
 
 }  // namespace regrade

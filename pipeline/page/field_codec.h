@@ -52,8 +52,8 @@ struct PageVoxels {
 };
 PageVoxels RecordsInPageOrder(const PageField& page, const Geometry& geometry);
 
-// About the opacity of each record: colours of which little is seen may be rounded more
-// coarsely.
+// About how much of each record is seen, in any unit: colours of which little is seen may be
+// rounded more coarsely.
 std::vector<float> ColorWeights(const Geometry& geometry);
 
 }  // namespace regrade

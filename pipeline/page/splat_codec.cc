@@ -18,6 +18,10 @@
 namespace regrade {
 namespace {
 
+// Of the step of voxels' colours: a sample of those is the mean of eight corners, whose roundings
+// differ.
+constexpr double kColorPart = 0.67;
+
 // The splats [begin, end) of a page that are packed together.
 struct Part {
   std::string prefix;  // of sections' names
@@ -109,11 +113,12 @@ PageField EncodeSplats(const RadianceField& any, double step) {
   const GridFrame& frame = field.geometry->frame;
   const int basis = field.appearance.basis;
   const SplatOptions options = SplatOptionsOf(field);
-  const std::vector<float> opacity = OpacityOfSplats(*field.geometry);
+  const std::vector<float> light = LightOfSplats(*field.geometry);
   std::vector<float> weight;
-  for (const int64_t i : order.splat) weight.push_back(opacity[static_cast<size_t>(i)]);
+  for (const int64_t i : order.splat) weight.push_back(light[static_cast<size_t>(i)]);
   const float* const sh = field.appearance.sh.data();
-  const ColorCode code = CodeOfRows({sh, basis, order.splat}, order.earlier, step, weight);
+  const ColorCode code = CodeOfRows({sh, basis, order.splat}, order.earlier,
+                                    kColorPart * step, weight);
   const auto count = std::ssize(order.splat);
   PageField page;
   page.header = JsonValue::Object{
@@ -191,11 +196,22 @@ PageVoxels SplatsInPageOrder(const PageField& page, const Geometry& geometry) {
   return {std::move(order.splat), std::move(order.earlier)};
 }
 
-std::vector<float> OpacityOfSplats(const Geometry& geometry) {
-  std::vector<float> opacity;
-  for (const float logit : geometry.splats.opacity_logit)
-    opacity.push_back(std::exp(LogSigmoid(logit)));
-  return opacity;
+std::vector<float> LightOfSplats(const Geometry& geometry) {
+  const SplatGeometry& splats = geometry.splats;
+  std::vector<float> light;
+  double sum = 0;
+  for (int64_t i = 0; i < geometry.num_voxels(); ++i) {
+    std::array<double, 3> log;
+    for (int a = 0; a < 3; ++a) log[static_cast<size_t>(a)] = splats.log_scale[3 * i + a];
+    std::ranges::sort(log);
+    const double area = std::exp(std::clamp(log[1] + log[2], -60.0, 60.0));
+    light.push_back(
+        static_cast<float>(area * std::exp(LogSigmoid(double{splats.opacity_logit[i]}))));
+    sum += double{light.back()};
+  }
+  const double mean = sum / static_cast<double>(light.size());
+  for (float& value : light) value = static_cast<float>(value / mean);
+  return light;
 }
 
 }  // namespace regrade

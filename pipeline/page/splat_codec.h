@@ -19,6 +19,7 @@ namespace regrade {
 PageField EncodeSplats(const RadianceField& field, double step);
 RadianceField DecodeSplats(const PageField& page);
 PageVoxels SplatsInPageOrder(const PageField& page, const Geometry& geometry);
-std::vector<float> OpacityOfSplats(const Geometry& geometry);
+// Opacity times the area of the two longest axes.
+std::vector<float> LightOfSplats(const Geometry& geometry);
 
 }  // namespace regrade

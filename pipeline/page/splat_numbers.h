@@ -23,8 +23,8 @@
 namespace regrade {
 
 inline constexpr double kPositionStep = 1.0 / 8192;  // of the box's half extent
-inline constexpr double kLogScaleStep = 1.0 / 24;
-inline constexpr double kRotationStep = 1.0 / 160;
+inline constexpr double kLogScaleStep = 1.0 / 80;
+inline constexpr double kRotationStep = 1.0 / 1024;  // large needles turn
 inline constexpr int kOpacitySteps = 256, kLeastOpacity = 2;
 
 // Position, scale, rotation, opacity.

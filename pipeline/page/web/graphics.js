@@ -39,6 +39,9 @@ class Graphics {
     this.bytes = this.most = 0;  // of all textures and buffers, now and so far
     this.marches = {};
     this.made = 0;  // textures so far
+    // Networks run on the cores where these draw, too; '#graphics' tests the others' way.
+    const name = gl.getParameter(gl.getExtension('WEBGL_debug_renderer_info')?.UNMASKED_RENDERER_WEBGL ?? gl.RENDERER);
+    if (location.hash === '#cores' || location.hash !== '#graphics' && /swiftshader|llvmpipe|software/i.test(name)) this.onCores = true;
     this.floats = !!(gl.getExtension('EXT_color_buffer_float') || gl.getExtension('EXT_color_buffer_half_float'));
     this.empty = {u: this.texture('u4', new Uint32Array(4)), i: this.texture('i1', new Int32Array(1)),
                   p: this.texture('u2', new Uint32Array(2))};

@@ -43,7 +43,6 @@ async function start(page) {
     if (page.round === round) sayUnpacked();
   });
   const graphics = new Graphics(gl);
-  if (location.hash === '#cores') graphics.onCores = true;
   // Null: the context was lost meanwhile.
   const whole = decoded.then((made) => {
     unpacked = 1;

@@ -49,8 +49,7 @@ async function inSlots(scene, data, words) {
 // Colours of a style, to draw the scene with; `codes`: the words of its voxels, if they are known.
 async function styleColors(graphics, scene, style, id, progress, codes = null) {
   const gl = graphics.gl;
-  graphics.network ??= check(gl, compile(gl, [[gl.VERTEX_SHADER, EVERY_PIXEL], [gl.FRAGMENT_SHADER, withCode(NETWORK_GLSL)]]));
-  const p = graphics.network, layers = await loadWeights(id), buffers = buffersOf(graphics, layers);
+  const layers = await loadWeights(id), buffers = buffersOf(graphics, layers);
   const names = ['Layer0', 'Layer1', 'Layer2', 'Layer3', 'Layer4', 'Layer5', 'Biases'];
   const {source} = scene, {height} = source.color;
   const colors = {code: checkCode(style.color, id), texelScale: style.sphere_scale ?? [1, 1, 1], background: style.background};
@@ -65,6 +64,7 @@ async function styleColors(graphics, scene, style, id, progress, codes = null) {
 
   // False if it would take long and `mayLeave` is set.
   async function pass(target, onSpheres, from, mayLeave) {
+    const p = graphics.network ??= check(gl, compile(gl, [[gl.VERTEX_SHADER, EVERY_PIXEL], [gl.FRAGMENT_SHADER, withCode(NETWORK_GLSL)]]));
     const {height} = target;
     gl.bindFramebuffer(gl.FRAMEBUFFER, framebuffer);
     gl.framebufferTexture2D(gl.FRAMEBUFFER, gl.COLOR_ATTACHMENT0, gl.TEXTURE_2D, target.texture, 0);

@@ -62,7 +62,7 @@ class Painter {
       this.frameTime = performance.now() - begun;
       // Half of a frame of 60 Hz, smoothly.
       const wanted = Math.sqrt(14 / Math.max(this.frameTime, 1));
-      this.part = Math.max(0.12, Math.min(1, this.part * Math.max(0.7, Math.min(1.15, wanted))));
+      this.part = Math.max(order ? 0.35 : 0.12, Math.min(1, this.part * Math.max(0.7, Math.min(1.15, wanted))));
       this.rest = performance.now() + 120;
       return true;
     }
