@@ -6,6 +6,14 @@
 #include "pipeline/page/voxel_codec.h"
 
 namespace regrade {
+namespace {
+
+bool HasSplats(const PageField& page) {
+  const JsonValue* const splats = page.header.Find("splats");
+  return splats != nullptr && !splats->IsNull();
+}
+
+}  // namespace
 
 PageField EncodeField(const RadianceField& field, double step) {
   return field.geometry->splats.on() ? EncodeSplats(field, step) : EncodeVoxels(field, step);
@@ -14,9 +22,7 @@ PageField EncodeField(const RadianceField& field, double step) {
 RadianceField DecodeField(const PageField& page) {
   if (page.header.At("format").AsInt() != kPageFormat)
     throw InputError("is of another format", "page");
-  const JsonValue* const splats = page.header.Find("splats");
-  RadianceField field =
-      splats != nullptr && !splats->IsNull() ? DecodeSplats(page) : DecodeVoxels(page);
+  RadianceField field = HasSplats(page) ? DecodeSplats(page) : DecodeVoxels(page);
   Validate(field, "page");
   return field;
 }
@@ -32,6 +38,8 @@ PageVoxels RecordsInPageOrder(const PageField& page, const Geometry& geometry) {
   return geometry.splats.on() ? SplatsInPageOrder(page, geometry)
                               : VoxelsInPageOrder(page, geometry);
 }
+
+const char* RecordsName(const PageField& page) { return HasSplats(page) ? "splats" : "voxels"; }
 
 std::vector<float> ColorWeights(const Geometry& geometry) {
   return geometry.splats.on() ? LightOfSplats(geometry) : OpacityOfVoxels(geometry);

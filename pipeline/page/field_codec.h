@@ -52,6 +52,9 @@ struct PageVoxels {
 };
 PageVoxels RecordsInPageOrder(const PageField& page, const Geometry& geometry);
 
+// "voxels" or "splats".
+const char* RecordsName(const PageField& page);
+
 // About how much of each record is seen, in any unit: colours of which little is seen may be
 // rounded more coarsely.
 std::vector<float> ColorWeights(const Geometry& geometry);

@@ -184,7 +184,8 @@ MadePage MakePage(const std::string& folder, const std::vector<std::string>& sty
   ReportOrThrow(progress, steps - 1, steps);
   if (!options.served) made.field = {}, made.places = {};
   made.html = PageHtml(content, options.check ? &check : nullptr);
-  made.voxels = content.field.header.At("voxels").AsInt();
+  made.records = content.field.header.At("voxels").AsInt();
+  made.records_name = RecordsName(content.field);
   made.field_bytes = InText(content.field.bytes());
   if (content.coarse) made.coarse_bytes = InText(content.coarse->bytes());
   for (const PageStyle& style : content.styles)

@@ -18,8 +18,8 @@
 namespace regrade {
 namespace {
 
-// Of the step of voxels' colours: a sample of those is the mean of eight corners, whose roundings
-// differ.
+// Of the step of voxels' colours: a sample of those is the mean of eight corners, whose
+// roundings differ.
 constexpr double kColorPart = 0.67;
 
 // The splats [begin, end) of a page that are packed together.
@@ -82,8 +82,8 @@ void PutSplats(const std::vector<int16_t>& numbers, const Part& part, Geometry* 
 void UnpackColors(const PageField& page, const Part& part, Appearance* appearance) {
   const ColorCode code = ColorCodeOf(page.header.At("color"));
   const size_t n = part.count();
-  const std::string bytes =
-      SectionBytes(page, part.prefix + "color", 2 * static_cast<size_t>(appearance->stride()) * n);
+  const std::string bytes = SectionBytes(page, part.prefix + "color",
+                                         2 * static_cast<size_t>(appearance->stride()) * n);
   std::vector<int64_t> splat;
   for (int64_t i = part.begin; i < part.end; ++i) splat.push_back(i);
   PutValues(ColorNumbers(bytes, code, appearance->basis, part.Earlier()), code,
@@ -117,8 +117,8 @@ PageField EncodeSplats(const RadianceField& any, double step) {
   std::vector<float> weight;
   for (const int64_t i : order.splat) weight.push_back(light[static_cast<size_t>(i)]);
   const float* const sh = field.appearance.sh.data();
-  const ColorCode code = CodeOfRows({sh, basis, order.splat}, order.earlier,
-                                    kColorPart * step, weight);
+  const ColorCode code =
+      CodeOfRows({sh, basis, order.splat}, order.earlier, kColorPart * step, weight);
   const auto count = std::ssize(order.splat);
   PageField page;
   page.header = JsonValue::Object{

@@ -1,7 +1,7 @@
 // Splats as whole numbers, as a page has them, and their order in it.
 //
 // EQ(page-splat): of splat i, with steps that are constants,
-//   position  p / kPositionStep, p in [-2, 2] of EQ(splat-position): steps inside the box are
+//   position  p / kPositionStep, p in [-2, 2], see EQ(splat-position): steps inside the box are
 //             all alike, and outside of it as far apart as directions from its middle
 //   scale     l / kLogScaleStep of the logarithms of the scales
 //   rotation  (x, y, z) / kRotationStep of the quaternion whose w is the largest component, so

@@ -24,8 +24,7 @@ constexpr double kStep = 0.03;  // regrade page's
 
 RadianceField FieldOf(int64_t count, int basis, bool antialiased = false) {
   const GridFrame box{{}, {0.1f, 0, -0.2f}, {0.8f, 1, 0.7f}};
-  Splats splats =
-      testing::CastSplats<float>(testing::RandomSplats(count, basis, 3, 1.4, 0.03));
+  Splats splats = testing::CastSplats<float>(testing::RandomSplats(count, basis, 3, 1.4, 0.03));
   for (size_t i = 0; i < splats.sh.size(); ++i)
     if (i % static_cast<size_t>(basis) != 0) splats.sh[i] *= 0.4f;
   return FieldOfSplats(splats, box, 0.1f, antialiased);
@@ -62,8 +61,8 @@ TEST(SplatCodec, NumbersAreRoundedByHalfAStep) {
       const auto part = static_cast<uint64_t>(a);
       splat.mean[a] = static_cast<float>(testing::Draw(1, i, 1 + part, -far, far));
       splat.log_scale[a] = static_cast<float>(testing::Draw(1, i, 4 + part, -9, 2));
-      farthest = std::max(farthest,
-                          std::abs(double{splat.mean[a] - box.center[a]} / double{box.radius[a]}));
+      farthest = std::max(
+          farthest, std::abs(double{splat.mean[a] - box.center[a]} / double{box.radius[a]}));
     }
     for (uint64_t a = 0; a < 4; ++a)
       splat.quaternion[a] = static_cast<float>(testing::Draw(1, i, 7 + a, -1, 1));
@@ -87,8 +86,8 @@ TEST(SplatCodec, NumbersAreRoundedByHalfAStep) {
         EXPECT_NEAR(rotation(r, k) * (along < 0 ? -1 : 1), want(r, k), 6 * kRotationStep);
     }
     const double opacity = std::exp(LogSigmoid(double{splat.opacity_logit}));
-    EXPECT_NEAR(std::exp(LogSigmoid(double{got.opacity_logit})),
-                std::min(opacity, 255.0 / 256), 0.5 / kOpacitySteps + 1e-6);
+    EXPECT_NEAR(std::exp(LogSigmoid(double{got.opacity_logit})), std::min(opacity, 255.0 / 256),
+                0.5 / kOpacitySteps + 1e-6);
   }
 }
 

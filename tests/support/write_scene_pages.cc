@@ -133,9 +133,8 @@ void WritePages(const std::string& folder, const std::string& name, const Radian
   content.cameras = CamerasOf(forward_facing);
   content.field = EncodeField(field, 0.03);
   // Small fields would have none.
-  if (const auto coarse = field.geometry->splats.on()
-                              ? std::nullopt
-                              : CoarseField(field, {.most_part = 10}))
+  if (const auto coarse =
+          field.geometry->splats.on() ? std::nullopt : CoarseField(field, {.most_part = 10}))
     content.coarse = EncodeField(*coarse, 0.03);
   RadianceField page = DecodeField(content.field);
   const PageVoxels places = RecordsInPageOrder(content.field, *page.geometry);
