@@ -234,7 +234,7 @@ def check_folder(browser, arguments):
             page.close()
         if number == 0 or name in ("uniform", "spheres", "spheres_object", "splats"):
             found += [f"{name}, opening: {c}" for c in check_coarse_first(browser, path) + check_without_workers(browser, path, views)]
-        if number == 0 or name in ("uniform_near", "levels_residual", "splats_object"):
+        if number == 0 or name in ("uniform_near", "levels_residual", "splats"):
             found += [f"{name}, {c}" for c in check_graphics(browser, path, views)]
     return found
 

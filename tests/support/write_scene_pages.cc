@@ -273,8 +273,7 @@ int main(int argc, char** argv) {
   WritePages(folder, "levels_residual", testing::RandomCellField({2, 3, 2}, 3, 9, 5), false,
              Layers::kResidual);
   WritePages(folder, "spheres_object", far, false, Layers::kObject);
-  WritePages(folder, "splats", SplatsField(), false);
-  WritePages(folder, "splats_object", SplatsField(), false, Layers::kObject);
+  WritePages(folder, "splats", SplatsField(), false, Layers::kResidual);
   WritePath(folder);
   WriteColorMaps(folder);
   return 0;
