@@ -50,8 +50,9 @@ void RunPage(const Command& command, const Arguments& arguments, Console* consol
   for (const std::string& line : made.report) console->Info(line);
   const double megabytes = static_cast<double>(made.html.size()) / 1e6;
   console->Info(Concat(
-      "wrote ", file.out, ": ", Format("%.1f", megabytes), " MB, ", made.voxels, " voxels of ",
-      Format("%.2f", static_cast<double>(made.field_bytes) / static_cast<double>(made.voxels)),
+      "wrote ", file.out, ": ", Format("%.1f", megabytes), " MB, ", made.records, " ",
+      made.records_name, " of ",
+      Format("%.2f", static_cast<double>(made.field_bytes) / static_cast<double>(made.records)),
       " bytes, ", Counted(std::ssize(styles), "style")));
   if (made.coarse_bytes > 0)
     console->Info(Concat(

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "kernels/field/cpu/render_view.h"
+#include "kernels/render/field_renderer.h"
 #include "pipeline/fields/camera_path.h"
 
 namespace regrade {
@@ -66,11 +66,10 @@ std::vector<Camera> CheckedViews(const std::vector<Camera>& photos, int longest)
 
 PageCheck CheckPage(const RadianceField& exact, const RadianceField& page,
                     const std::vector<Camera>& cameras) {
-  const FastGrid exact_grid = MakeFastGrid(exact), page_grid = MakeFastGrid(page);
+  const FieldRenderer of_exact(exact, Backend::kCpu), of_page(page, Backend::kCpu);
   PageCheck check{1e9, 0, static_cast<int>(cameras.size())};
   for (const Camera& camera : cameras) {
-    const double db = Psnr(RenderView(exact_grid, camera, MarchOptions{exact.step}).color,
-                           RenderView(page_grid, camera, MarchOptions{page.step}).color);
+    const double db = Psnr(of_exact.Render(camera).color, of_page.Render(camera).color);
     check.worst_db = std::min(check.worst_db, db);
     check.mean_db += db / check.views;
   }

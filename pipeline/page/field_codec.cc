@@ -1,324 +1,48 @@
 #include "pipeline/page/field_codec.h"
 
-#include <algorithm>
-#include <cmath>
-#include <utility>
-
 #include "kernels/base/error.h"
-#include "kernels/base/half.h"
-#include "pipeline/files/deflate.h"
-#include "pipeline/page/color_code.h"
-#include "pipeline/page/page_order.h"
-#include "pipeline/page/sphere_order.h"
-#include "pipeline/page/value_codec.h"
+#include "pipeline/page/coarse_field.h"
+#include "pipeline/page/splat_codec.h"
+#include "pipeline/page/voxel_codec.h"
 
 namespace regrade {
 namespace {
 
-constexpr char kWhere[] = "page";
-constexpr uint64_t kMaxPlaces = uint64_t{1} << 29;  // bytes
-constexpr double kSphereStep = 0.02;  // of background colours, 3 coefficients a texel
-
-JsonValue::Array ArrayOf(const Vec3f& v) { return {double{v.x}, double{v.y}, double{v.z}}; }
-
-template <typename T>
-JsonValue::Array ArrayOf(const std::vector<T>& values) {
-  return {values.begin(), values.end()};
-}
-
-std::vector<double> NumbersAt(const JsonValue& object, const char* key, size_t count) {
-  std::vector<double> numbers;
-  for (const JsonValue& value : object.At(key).AsArray()) numbers.push_back(value.AsDouble());
-  if (numbers.size() != count)
-    throw InputError(Concat(numbers.size(), " numbers, ", count, " expected"), key);
-  return numbers;
-}
-
-Vec3f Vec3At(const JsonValue& object, const char* key) {
-  const std::vector<double> n = NumbersAt(object, key, 3);
-  return Vec3d{n[0], n[1], n[2]}.Cast<float>();
-}
-
-// The largest of a voxel's edges, world units: lengths in a page are in units of it.
-double VoxelWidth(const GridFrame& frame) {
-  const Vec3f scale = frame.Scale();
-  return 1 / double{std::min({scale.x, scale.y, scale.z})};
-}
-
-void AddSection(const char* name, const std::string& bytes, PageField* page) {
-  page->sections.push_back({name, Deflate(bytes)});
-}
-
-std::string SectionBytes(const PageField& page, const char* name, uint64_t max_bytes) {
-  for (const PageSection& section : page.sections)
-    if (section.name == name) return Inflate(section.packed, max_bytes, name);
-  throw InputError("is missing", name);
-}
-
-// The mean of a coefficient over a voxel's earlier neighbours, 0 without any.
-float EarlierMean(const ColorRows& rows, const EarlierVoxels& earlier, int coefficient) {
-  float sum = 0, n = 0;
-  for (const int32_t other : earlier)
-    if (other >= 0) sum += rows[static_cast<size_t>(other)][coefficient], ++n;
-  return n > 0 ? sum / n : 0;
-}
-
-void EncodeVoxelColors(const ColorRows& rows, const std::vector<EarlierVoxels>& earlier,
-                       double step, PageField* page) {
-  const int channels = 3 * rows.basis;
-  std::vector<float> values, differences;
-  for (const size_t i : FittedVoxels(rows.size())) {
-    values.insert(values.end(), rows[i], rows[i] + channels);
-    for (int c = 0; c < channels; ++c)
-      differences.push_back(rows[i][c] - EarlierMean(rows, earlier[i], c));
-  }
-  const ColorCode code = FitColorCode(differences, values, rows.basis, step);
-  const std::string bytes = PackNumbers(NumbersOf(rows, code), channels, earlier);
-  AddSection("color", bytes, page);  // the numbers are gone
-  page->header["color"] = JsonOf(code);
-}
-
-// Sets the coefficients [V, 3, basis] of the voxels `voxel`.
-void DecodeVoxelColors(const PageField& page, int basis, const std::vector<int64_t>& voxel,
-                       const std::vector<EarlierVoxels>& earlier, Buffer<float>* sh) {
-  const ColorCode code = ColorCodeOf(page.header.At("color"));
-  const size_t channels = static_cast<size_t>(3 * basis), n = earlier.size();
-  const std::vector<int16_t> numbers = UnpackNumbers(
-      SectionBytes(page, "color", 2 * channels * n), static_cast<int>(channels), earlier);
-  for (size_t c = 0; c < channels; ++c) {
-    const int limit =
-        code.limit(static_cast<int>(c) / basis * kCodeHarmonics + static_cast<int>(c) % basis);
-    for (size_t i = 0; i < n; ++i)
-      if (std::abs(numbers[c * n + i]) > limit)
-        throw InputError("a number has more bits than it may have", "color");
-  }
-  PutValues(numbers, code, basis, voxel, sh->data());
-  for (const float value : *sh)
-    if (!std::isfinite(value)) throw InputError("a coefficient is not finite", "color");
-}
-
-// The colours of background spheres.
-void EncodeColors(const std::vector<float>& values, int channels,
-                  const std::vector<EarlierVoxels>& earlier, double step, const char* name,
-                  PageField* page) {
-  const ValueTransform transform =
-      DecorrelatingTransform(Differences(values, channels, earlier), channels);
-  const std::vector<int16_t> numbers = NumbersOf(values, transform, step);
-  AddSection(name, PackNumbers(numbers, channels, earlier), page);
-  page->header[name] = JsonValue::Object{
-      {"step", step},
-      {"matrix", ArrayOf(transform.matrix)},
-      {"scale", ArrayOf(CodeScales(ValuesOf(numbers, transform, step), channels))}};
-}
-
-// [V, channels], of 8 bits.
-std::vector<float> DecodeColors(const PageField& page, int channels,
-                                const std::vector<EarlierVoxels>& earlier, const char* name) {
-  const JsonValue& header = page.header.At(name);
-  const size_t n = static_cast<size_t>(channels);
-  const ValueTransform transform{channels, NumbersAt(header, "matrix", n * n)};
-  const std::vector<double> scale = NumbersAt(header, "scale", n);
-  for (const double s : scale)
-    if (!(s > 0 && s < 1e30)) throw InputError("a scale is not valid", name);
-  const std::string bytes = SectionBytes(page, name, 2 * n * earlier.size());
-  std::vector<float> values = ValuesOf(UnpackNumbers(bytes, channels, earlier), transform,
-                                       header.At("step").AsDouble());
-  for (size_t i = 0; i < values.size(); ++i) {
-    const double s = scale[i % n];
-    if (!std::isfinite(values[i])) throw InputError("a coefficient is not finite", name);
-    values[i] = static_cast<float>((CodeOf(values[i], s) - 128) * s);
-  }
-  return values;
-}
-
-float AsHalf(double density, double unit) {
-  const auto scaled =
-      static_cast<float>(std::clamp(density * unit, -double{kMaxHalf}, double{kMaxHalf}));
-  return static_cast<float>(FloatFromHalf(HalfFromFloat(scaled)) / unit);
-}
-
-void EncodeSpheres(const RadianceField& field, PageField* page) {
-  const SphereGeometry& spheres = field.geometry->spheres;
-  if (!spheres.on()) return;
-  const std::string mask = MaskOfSpheres(spheres);
-  const SphereOrder order = OrderOfSpheres(mask, spheres.resolution, spheres.layers);
-  std::vector<int16_t> density;
-  std::vector<float> color;
-  for (const int32_t place : order.place)
-    for (int i = 0; i < spheres.layers; ++i) {
-      const int64_t texel = int64_t{spheres.links[place]} * spheres.layers + i;
-      density.push_back(DensityNumber(spheres.density[texel], 1.0 / spheres.layers));
-      color.insert(color.end(), field.appearance.sphere_color.data() + 3 * texel,
-                   field.appearance.sphere_color.data() + 3 * texel + 3);
-    }
-  page->header["spheres"] =
-      JsonValue::Object{{"layers", spheres.layers}, {"resolution", spheres.resolution}};
-  AddSection("sphere_mask", mask, page);
-  AddSection("sphere_density", PackNumbers(density, 1, order.earlier), page);
-  EncodeColors(color, 3, order.earlier, kSphereStep, "sphere_color", page);
-}
-
-void DecodeSpheres(const PageField& page, Geometry* geometry, Buffer<float>* color) {
-  const JsonValue* const header = page.header.Find("spheres");
-  if (header == nullptr || header->IsNull()) return;
-  SphereGeometry& spheres = geometry->spheres;
-  const int64_t layers = header->At("layers").AsInt();
-  const int64_t resolution = header->At("resolution").AsInt();
-  if (layers < 1 || layers > kMaxLayers || resolution < 2 || resolution > kMaxSphereResolution)
-    throw InputError("the background is not valid", kWhere);
-  spheres.layers = static_cast<int>(layers);
-  spheres.resolution = static_cast<int>(resolution);
-  const std::string mask = SectionBytes(
-      page, "sphere_mask", static_cast<uint64_t>(2 * resolution * resolution / 8 + 1));
-  const SphereOrder order = OrderOfSpheres(mask, spheres.resolution, spheres.layers);
-  spheres.links.Resize(2 * resolution * resolution);
-  std::fill(spheres.links.begin(), spheres.links.end(), -1);
-  for (size_t i = 0; i < order.place.size(); ++i)
-    spheres.links[order.place[i]] = static_cast<int32_t>(i);
-  const std::vector<int16_t> density = UnpackNumbers(
-      SectionBytes(page, "sphere_density", 2 * order.earlier.size()), 1, order.earlier);
-  const std::vector<float> values = DecodeColors(page, 3, order.earlier, "sphere_color");
-  spheres.density.Resize(static_cast<int64_t>(density.size()));
-  for (size_t i = 0; i < density.size(); ++i)
-    spheres.density[static_cast<int64_t>(i)] =
-        AsHalf(DensityOfNumber(density[i], 1.0 / spheres.layers), 1);
-  color->Resize(static_cast<int64_t>(values.size()));
-  std::copy(values.begin(), values.end(), color->begin());
-}
-
-// Where the voxels of the page are in the field: [V].
-std::vector<int64_t> VoxelsOf(const Geometry& geometry, const PageOrder& order) {
-  std::vector<int64_t> voxel;
-  for (const Vec3i& place : order.place)
-    voxel.push_back(geometry.cells.on()
-                        ? FindKey(geometry.cells.vertex_key, KeyOf(place))
-                        : geometry.links[geometry.frame.Vertex(place.x, place.y, place.z)]);
-  return voxel;
-}
-
-PageOrder OrderOf(const Geometry& geometry, const std::string& places) {
-  const Vec3i& voxels = geometry.frame.resolution;
-  return geometry.cells.on() ? OrderOfTree(places, voxels, geometry.cells.finest)
-                             : OrderOfMask(places, voxels);
-}
-
-void MakeCells(const PageOrder& order, int finest, Geometry* geometry) {
-  CellGrid& cells = geometry->cells;
-  cells.finest = finest;
-  std::vector<std::pair<CellKey, int>> found;
-  for (const PageCell& cell : order.cells) found.emplace_back(KeyOf(cell.low), cell.level);
-  std::sort(found.begin(), found.end());
-  cells.key.Resize(static_cast<int64_t>(found.size()));
-  cells.level.Resize(cells.key.size());
-  for (int64_t i = 0; i < cells.key.size(); ++i) {
-    cells.key[i] = found[static_cast<size_t>(i)].first;
-    cells.level[i] = static_cast<uint8_t>(found[static_cast<size_t>(i)].second);
-  }
-  FindVertices(&cells);
-  BuildTree(geometry->frame.resolution, &cells);
-}
-
-void MakeLinks(const PageOrder& order, Geometry* geometry) {
-  geometry->links.Resize(geometry->frame.NumVertices());
-  std::fill(geometry->links.begin(), geometry->links.end(), -1);
-  for (size_t i = 0; i < order.place.size(); ++i) {
-    const Vec3i& at = order.place[i];
-    geometry->links[geometry->frame.Vertex(at.x, at.y, at.z)] = static_cast<int32_t>(i);
-  }
+bool HasSplats(const PageField& page) {
+  const JsonValue* const splats = page.header.Find("splats");
+  return splats != nullptr && !splats->IsNull();
 }
 
 }  // namespace
 
-PageVoxels VoxelsInPageOrder(const PageField& page, const Geometry& geometry) {
-  PageOrder order =
-      OrderOf(geometry, SectionBytes(page, geometry.cells.on() ? "tree" : "mask", kMaxPlaces));
-  std::vector<int64_t> voxel = VoxelsOf(geometry, order);
-  return {std::move(voxel), std::move(order.earlier)};
-}
-
 PageField EncodeField(const RadianceField& field, double step) {
-  const Geometry& geometry = *field.geometry;
-  const GridFrame& frame = geometry.frame;
-  const bool on_cells = geometry.cells.on();
-  PageField page;
-  const std::string places = on_cells ? TreeOfCells(geometry) : MaskOfGrid(geometry);
-  const PageOrder order = OrderOf(geometry, places);
-  const std::vector<int64_t> voxel = VoxelsOf(geometry, order);
-  std::vector<int16_t> density;
-  const double unit = VoxelWidth(frame);
-  for (size_t i = 0; i < voxel.size(); ++i)
-    density.push_back(
-        DensityNumber(geometry.density[voxel[i]], unit * (1 << order.width_log2[i])));
-  page.header = JsonValue::Object{
-      {"format", kPageFormat},
-      {"voxels", static_cast<int64_t>(voxel.size())},
-      {"resolution",
-       JsonValue::Array{frame.resolution.x, frame.resolution.y, frame.resolution.z}},
-      {"center", ArrayOf(frame.center)},
-      {"radius", ArrayOf(frame.radius)},
-      {"finest", on_cells ? JsonValue(geometry.cells.finest) : JsonValue()},
-      {"basis", field.appearance.basis},
-      {"background", ArrayOf(field.background)},
-      {"near", double{field.near_clip}},
-      {"step", double{field.step}}};
-  AddSection(on_cells ? "tree" : "mask", places, &page);
-  AddSection("density", PackNumbers(density, 1, order.earlier), &page);
-  EncodeVoxelColors({field.appearance.sh.data(), field.appearance.basis, voxel}, order.earlier,
-                    step, &page);
-  EncodeSpheres(field, &page);
-  return page;
+  return field.geometry->splats.on() ? EncodeSplats(field, step) : EncodeVoxels(field, step);
 }
 
 RadianceField DecodeField(const PageField& page) {
-  const JsonValue& header = page.header;
-  if (header.At("format").AsInt() != kPageFormat)
-    throw InputError("is of another format", kWhere);
-  auto geometry = std::make_shared<Geometry>();
-  GridFrame& frame = geometry->frame;
-  const std::vector<double> resolution = NumbersAt(header, "resolution", 3);
-  for (int a = 0; a < 3; ++a) {
-    if (!(resolution[a] >= 2 && resolution[a] <= kMaxLattice))
-      throw InputError("the resolution is not valid", kWhere);
-    frame.resolution[a] = static_cast<int>(resolution[a]);
-  }
-  frame.center = Vec3At(header, "center");
-  frame.radius = Vec3At(header, "radius");
-  for (int a = 0; a < 3; ++a)
-    if (!(frame.radius[a] > 0) || !std::isfinite(frame.radius[a]))
-      throw InputError("the box is not valid", kWhere);
-  const bool on_cells = !header.At("finest").IsNull();
-  const std::string places = SectionBytes(page, on_cells ? "tree" : "mask", kMaxPlaces);
-  const int finest =
-      on_cells ? static_cast<int>(std::clamp<int64_t>(header.At("finest").AsInt(), -1, 99)) : 0;
-  const PageOrder order = on_cells ? OrderOfTree(places, frame.resolution, finest)
-                                   : OrderOfMask(places, frame.resolution);
-  if (order.place.empty()) throw InputError("there are no voxels", kWhere);
-  RadianceField field;
-  const int64_t basis = header.At("basis").AsInt();
-  if (basis != 1 && basis != 4 && basis != 9)
-    throw InputError("the basis is not valid", kWhere);
-  field.appearance.basis = static_cast<int>(basis);
-  const int channels = field.appearance.stride();
-  const std::vector<int16_t> density =
-      UnpackNumbers(SectionBytes(page, "density", 2 * order.place.size()), 1, order.earlier);
-  on_cells ? MakeCells(order, finest, geometry.get()) : MakeLinks(order, geometry.get());
-  const double unit = VoxelWidth(frame);
-  const auto n = static_cast<int64_t>(order.place.size());
-  geometry->density.Resize(n);
-  field.appearance.sh.Resize(n * channels);
-  const std::vector<int64_t> voxel = VoxelsOf(*geometry, order);
-  for (size_t i = 0; i < voxel.size(); ++i) {
-    geometry->density[voxel[i]] =
-        AsHalf(DensityOfNumber(density[i], unit * (1 << order.width_log2[i])), unit);
-  }
-  DecodeVoxelColors(page, field.appearance.basis, voxel, order.earlier, &field.appearance.sh);
-  DecodeSpheres(page, geometry.get(), &field.appearance.sphere_color);
-  field.background = Vec3At(header, "background");
-  field.near_clip = static_cast<float>(header.At("near").AsDouble());
-  field.step = static_cast<float>(header.At("step").AsDouble());
-  field.geometry = std::move(geometry);
-  Validate(field, kWhere);
+  if (page.header.At("format").AsInt() != kPageFormat)
+    throw InputError("is of another format", "page");
+  RadianceField field = HasSplats(page) ? DecodeSplats(page) : DecodeVoxels(page);
+  Validate(field, "page");
   return field;
+}
+
+std::optional<PageField> EncodeCoarse(const RadianceField& field, double step) {
+  if (field.geometry->splats.on()) return std::nullopt;
+  const std::optional<RadianceField> coarse = CoarseField(field);
+  if (!coarse) return std::nullopt;
+  return EncodeField(*coarse, step);
+}
+
+PageVoxels RecordsInPageOrder(const PageField& page, const Geometry& geometry) {
+  return geometry.splats.on() ? SplatsInPageOrder(page, geometry)
+                              : VoxelsInPageOrder(page, geometry);
+}
+
+const char* RecordsName(const PageField& page) { return HasSplats(page) ? "splats" : "voxels"; }
+
+std::vector<float> ColorWeights(const Geometry& geometry) {
+  return geometry.splats.on() ? LightOfSplats(geometry) : OpacityOfVoxels(geometry);
 }
 
 }  // namespace regrade

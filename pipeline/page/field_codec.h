@@ -1,21 +1,15 @@
-// Packs a radiance field for a page, and unpacks it as the page does.
+// Packs a radiance field of any kind for a page, and unpacks it as the page does.
 //
-// Sections, each compressed by itself (see deflate.h): "tree" or "mask" (page_order.h);
-// "density" (see EQ(page-density)); "color" (see EQ(page-color-code)); and of background
-// spheres "sphere_mask" (a bit for each texel of the map, [2R, R], the lowest bit first),
-// "sphere_density" and "sphere_color" of texels [columns, layers]. Numbers are packed as
-// EQ(page-prediction) says. What is no array is in the header, a JSON object.
-//
-// The field that comes out holds what a graphics processor holds: densities in half precision,
-// in units of one over a voxel's width, coefficients in the 128 bits of a voxel, and spheres'
-// coefficients of 8 bits, each channel with a scale.
+// A page's field is a header, a JSON object, and sections of bytes, each compressed by itself
+// (see deflate.h): what they hold is in voxel_codec.h and splat_codec.h. Whatever depends on
+// the kind of a field is decided here.
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "kernels/field/radiance_field.h"
-#include "kernels/scene/ndc.h"
 #include "pipeline/files/json_file.h"
 #include "pipeline/page/page_order.h"
 
@@ -46,12 +40,23 @@ PageField EncodeField(const RadianceField& field, double step);
 // memory in proportion to what the sections unpack to.
 RadianceField DecodeField(const PageField& page);
 
-// The voxels of a page in its order: which they are in `geometry`, that of the field that was
+// A small field that stands for the whole one until that is unpacked, see coarse_field.h. None
+// where the page has no need of one: splats begin with those that contribute most.
+std::optional<PageField> EncodeCoarse(const RadianceField& field, double step);
+
+// The records of a page in its order: which they are in `geometry`, that of the field that was
 // encoded or decoded, and from which others they are predicted.
 struct PageVoxels {
   std::vector<int64_t> voxel;
   std::vector<EarlierVoxels> earlier;
 };
-PageVoxels VoxelsInPageOrder(const PageField& page, const Geometry& geometry);
+PageVoxels RecordsInPageOrder(const PageField& page, const Geometry& geometry);
+
+// "voxels" or "splats".
+const char* RecordsName(const PageField& page);
+
+// About how much of each record is seen, in any unit: colours of which little is seen may be
+// rounded more coarsely.
+std::vector<float> ColorWeights(const Geometry& geometry);
 
 }  // namespace regrade

@@ -7,7 +7,6 @@
 #include <utility>
 
 #include "kernels/base/error.h"
-#include "kernels/field/cpu/render_view.h"
 #include "kernels/field/field_seen_by.h"
 #include "kernels/field/pad_sh_basis.h"
 #include "kernels/image/color_statistics.h"
@@ -20,7 +19,6 @@
 #include "pipeline/files/text.h"
 #include "pipeline/images/image_file.h"
 #include "pipeline/page/check_page.h"
-#include "pipeline/page/coarse_field.h"
 #include "pipeline/page/keyframes.h"
 #include "pipeline/page/page_file.h"
 #include "pipeline/run/run_file.h"
@@ -110,8 +108,7 @@ const Camera& HomeOf(const PageContent& content) {
 void EncodeScene(const RadianceField& field, const WorkingViews& views,
                  const PageOptions& options, PageContent* content) {
   std::future<void> beside = std::async(std::launch::async, [&] {
-    if (const std::optional<RadianceField> coarse = CoarseField(field))
-      content->coarse = EncodeField(*coarse, options.step);
+    content->coarse = EncodeCoarse(field, options.step);
     AddPhotos(views, options.names == "on", content);
   });
   content->field = EncodeField(field, options.step);
@@ -135,7 +132,7 @@ void AddStyle(const std::string& style_folder, const std::string& name,
   const StoredNetwork network = ReadNetworkFile(style_folder + "/network.npz");
   const StyleLayers layers = ReadLayers(style_folder, source.geometry->num_voxels());
   std::vector<int64_t> of;
-  if (!layers.empty()) of = VoxelsInPageOrder(content->field, *source.geometry).voxel;
+  if (!layers.empty()) of = RecordsInPageOrder(content->field, *source.geometry).voxel;
   PageStyle style = EncodeStyle(network, made->field, StrengthOf(style_folder),
                                 InPageOrder(layers, of), made->places);
   const Image picture = RenderHome(style.styled, HomeOf(*content));
@@ -170,7 +167,7 @@ MadePage MakePage(const std::string& folder, const std::vector<std::string>& sty
   if (!options.check) stored.field.appearance = {};  // fields have gigabytes
   MadePage made;
   made.field = DecodeField(content.field);
-  made.places = VoxelsInPageOrder(content.field, *made.field.geometry);
+  made.places = RecordsInPageOrder(content.field, *made.field.geometry);
   std::vector<Camera> checked;
   PageCheck check;
   if (options.check) {
@@ -187,7 +184,8 @@ MadePage MakePage(const std::string& folder, const std::vector<std::string>& sty
   ReportOrThrow(progress, steps - 1, steps);
   if (!options.served) made.field = {}, made.places = {};
   made.html = PageHtml(content, options.check ? &check : nullptr);
-  made.voxels = content.field.header.At("voxels").AsInt();
+  made.records = content.field.header.At("voxels").AsInt();
+  made.records_name = RecordsName(content.field);
   made.field_bytes = InText(content.field.bytes());
   if (content.coarse) made.coarse_bytes = InText(content.coarse->bytes());
   for (const PageStyle& style : content.styles)

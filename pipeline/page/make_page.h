@@ -38,12 +38,13 @@ struct PageOptions {
 
 struct MadePage {
   std::string html;
-  int64_t voxels = 0, field_bytes = 0;  // in the text of the page
-  int64_t coarse_bytes = 0;             // of what is shown first
+  int64_t records = 0, field_bytes = 0;  // in the text of the page
+  const char* records_name = "";         // see RecordsName
+  int64_t coarse_bytes = 0;              // of what is shown first
   std::vector<int64_t> style_bytes;
   std::vector<std::string> report;  // lines of --check
   RadianceField field;              // as the page has it
-  PageVoxels places;                // its voxels, as the page orders them
+  PageVoxels places;                // its records, as the page orders them
 };
 
 // `styles`: names in `folder`; with what they add voxel by voxel. Throws Error(kInput).

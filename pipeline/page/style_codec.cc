@@ -39,20 +39,14 @@ std::vector<double> RoundToCodes(Buffer<float>* values, int channels) {
   return scale;
 }
 
-// About the opacity of a voxel: what little of it is seen may be rounded more coarsely.
-float Opacity(double density, double width) {
-  return static_cast<float>(1.01 - std::exp(-std::max(0.0, density) * width));
-}
-
 ColorCode RoundToWords(const Geometry& geometry, Buffer<float>* sh) {
-  std::vector<int64_t> voxel(static_cast<size_t>(geometry.density.size()));
+  std::vector<int64_t> voxel(static_cast<size_t>(geometry.num_voxels()));
   std::iota(voxel.begin(), voxel.end(), 0);
   const ColorRows rows{sh->data(), kStyledBasis, voxel};
-  const Vec3f scale = geometry.frame.Scale();
-  const double width = 1 / double{std::min({scale.x, scale.y, scale.z})};
+  const std::vector<float> opacity = ColorWeights(geometry);
   std::vector<float> values, spread, weight;
   for (const size_t i : FittedVoxels(rows.size())) {
-    weight.push_back(Opacity(geometry.density[voxel[i]], width));
+    weight.push_back(opacity[i]);
     for (int c = 0; c < 3 * kStyledBasis; ++c) {
       values.push_back(rows[i][c]);
       spread.push_back(rows[i][c] * std::sqrt(weight.back()));

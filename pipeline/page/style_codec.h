@@ -31,7 +31,7 @@ PageStyle EncodeStyle(const StoredNetwork& stored, const RadianceField& page, do
                       const StyleLayers& layers, const PageVoxels& places);
 
 // The styled coefficients as a page that has run the network holds them: four words of 32 bits,
-// the lowest byte first, for each of `voxels`, see VoxelsInPageOrder.
+// the lowest byte first, for each of `voxels`, see RecordsInPageOrder.
 std::string StyledWords(const PageStyle& style, const std::vector<int64_t>& voxels);
 
 }  // namespace regrade

@@ -4,11 +4,13 @@
 #include <charconv>
 #include <cmath>
 
+#include "kernels/splats/splat_field.h"
 #include "pipeline/files/deflate.h"
 #include "pipeline/page/field_codec.h"
 #include "tests/fuzz/fuzz_support.h"
 #include "tests/fuzz/mutate.h"
 #include "tests/support/cell_field.h"
+#include "tests/support/small_splats.h"
 
 namespace regrade::testing {
 namespace {
@@ -51,10 +53,13 @@ Parts Split(std::string_view bytes) {
 
 std::vector<std::string> FieldSeeds() {
   std::vector<std::string> seeds;
-  for (const int seed : {0, 1, 2}) {  // cells, a grid, one with background spheres
+  for (const int seed : {0, 1, 2, 3}) {  // cells, a grid, one with background spheres, splats
     RadianceField field =
         seed == 0 ? RandomCellField({1, 2, 1}, 2, 1, 3) : RandomField({5, 4, 6}, 4, 0.5, 1);
     if (seed == 2) AddSpheres(3, 4, 0.6, 2, &field);
+    if (seed == 3)
+      field = FieldOfSplats(CastSplats<float>(RandomSplats(20, 4, 1)), {{}, {}, {1, 1, 1}}, 0,
+                            false);
     const PageField page = EncodeField(field, 0.1);
     Parts parts{DumpJson(page.header, -1), {}};
     for (const PageSection& section : page.sections)
@@ -71,11 +76,13 @@ bool ReadField(std::string_view bytes) {
     for (const auto& [name, content] : parts.sections)
       page.sections.push_back({name, Deflate(content)});
     const RadianceField field = DecodeField(page);
-    const int64_t voxels = field.geometry->density.size();
-    FuzzRequire(field.appearance.sh.size() == voxels * field.appearance.stride(),
-                "each voxel has its coefficients");
-    for (int64_t i = 0; i < voxels; ++i)
-      FuzzRequire(std::isfinite(field.geometry->density[i]), "densities are numbers");
+    const int64_t records = field.geometry->num_voxels();
+    FuzzRequire(field.appearance.sh.size() == records * field.appearance.stride(),
+                "each record has its coefficients");
+    for (const float density : field.geometry->density)
+      FuzzRequire(std::isfinite(density), "densities are numbers");
+    for (const float mean : field.geometry->splats.mean)
+      FuzzRequire(std::isfinite(mean), "means are numbers");
     for (const float value : field.appearance.sh)
       FuzzRequire(std::isfinite(value), "coefficients are numbers");
   });

@@ -32,7 +32,7 @@ StyleLayers SomeLayers(size_t voxels) {
 TEST(ResidualCodec, RoundedByHalfAStepAndZeroStaysZero) {
   const RadianceField field = testing::RandomCellField({2, 3, 2}, 3, 9, 5);
   const PageField page = EncodeField(field, 0.03);
-  const PageVoxels places = VoxelsInPageOrder(page, *field.geometry);
+  const PageVoxels places = RecordsInPageOrder(page, *field.geometry);
   const size_t n = places.voxel.size();
   const StyleLayers layers = SomeLayers(n);
   const PageResidual packed = EncodeResidual(layers, places.earlier);
@@ -60,7 +60,7 @@ TEST(ResidualCodec, RoundedByHalfAStepAndZeroStaysZero) {
 TEST(ResidualCodec, NothingAddedCostsAlmostNothing) {
   const RadianceField field = testing::RandomCellField({4, 4, 4}, 3, 1, 5);
   const PageField page = EncodeField(field, 0.03);
-  const PageVoxels places = VoxelsInPageOrder(page, *field.geometry);
+  const PageVoxels places = RecordsInPageOrder(page, *field.geometry);
   const size_t n = places.voxel.size();
   StyleLayers layers;
   layers.residual.color.resize(n);
@@ -102,8 +102,8 @@ TEST(ResidualCodec, VoxelsOfRoundedDensitiesKeepTheirNumbers) {
   field.geometry = geometry;
   const PageField page = EncodeField(field, 0.03);
   const RadianceField decoded = DecodeField(page);
-  const PageVoxels before = VoxelsInPageOrder(page, *field.geometry);
-  const PageVoxels after = VoxelsInPageOrder(page, *decoded.geometry);
+  const PageVoxels before = RecordsInPageOrder(page, *field.geometry);
+  const PageVoxels after = RecordsInPageOrder(page, *decoded.geometry);
   ASSERT_EQ(std::ssize(after.voxel), page.header.At("voxels").AsInt());
   ASSERT_EQ(before.voxel.size(), after.voxel.size());
   for (size_t i = 0; i < after.voxel.size(); ++i) {

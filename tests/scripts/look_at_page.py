@@ -200,15 +200,15 @@ def check_film(page, folder, shots):
     return [] if film["worst"] >= 35 else [f"a frame of the film is {film['worst']:.1f} dB from the page"]
 
 
-def check_cores(browser, path, views):
-    """Styles made by workers, as where the graphics processor is slow."""
+def check_graphics(browser, path, views):
+    """Styles made on the graphics processor, as where it is no program on the cores."""
     page = open_page(browser, path, SIZES["phone"], scale=FEW_PIXELS)
-    page.value("location.hash = '#cores'")
+    page.value("location.hash = '#graphics'")
     page.reload()
     wait_until(page, "!!globalThis.regradePage && !!regradePage.picture")
     found = compare_pictures(page, [view for view in views if view["weights"][0] == 1]) + complaints(page)
     page.close()
-    return ["styled on cores: " + complaint for complaint in found]
+    return ["styled on the graphics processor: " + complaint for complaint in found]
 
 
 def check_folder(browser, arguments):
@@ -232,10 +232,10 @@ def check_folder(browser, arguments):
             here += complaints(page)
             found += [f"{name}, {size_name}: {complaint}" for complaint in here]
             page.close()
-        if number == 0 or name in ("uniform", "spheres", "spheres_object"):
+        if number == 0 or name in ("uniform", "spheres", "spheres_object", "splats"):
             found += [f"{name}, opening: {c}" for c in check_coarse_first(browser, path) + check_without_workers(browser, path, views)]
-        if number == 0 or name in ("uniform_near", "levels_residual"):
-            found += [f"{name}, {c}" for c in check_cores(browser, path, views)]
+        if number == 0 or name in ("uniform_near", "levels_residual", "splats"):
+            found += [f"{name}, {c}" for c in check_graphics(browser, path, views)]
     return found
 
 

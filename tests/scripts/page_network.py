@@ -86,10 +86,10 @@ BOUND = """(async () => {
   for (let l = 1; l < 6; ++l) sine = (sine + each) * norms[l].s * (l < 5 ? style.omega : 1);
   const allowed = Math.hypot(...styled.code.step) + 2 * sine;
 
-  const shift = p.header.finest === null ? 0.5 : 0, x = new Float64Array(30), y = new Float64Array(30);
+  const {shift} = p.scene, x = new Float64Array(30), y = new Float64Array(30);
   const features = (i, to) => {
     numbers(before27, source.code, i, to);
-    const a = places[2 * i], place = [a & 8191, a >>> 13, places[2 * i + 1]];
+    const a = places[2 * i], place = [a & 65535, a >>> 16, places[2 * i + 1]];
     for (let k = 0; k < 3; ++k) to[27 + k] = ((place[k] + shift) * p.scene.positionUnit[k] - 1) * style.position_scale;
   };
   const own = new Float64Array(27), other = new Float64Array(27);

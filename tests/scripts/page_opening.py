@@ -95,7 +95,7 @@ def check_coarse_first(browser, path):
     page.call("Input.dispatchKeyEvent", type="keyUp", key="ArrowRight")
     wait_until(page, "regradePage.painter.settled")
     page.value("home.click(); 0")
-    coarse = page.value("[regradePage.scene].concat(regradePage.painter.scene.tree.bytes)")[1]
+    coarse = page.value("regradePage.painter.scene.parts.length")
     page.value(TAKEN)
     page.value("letThrough(); 0")
     wait_until(page, "!!regradePage.picture && regradePage.begun && regradePage.painter.settled && message.textContent === ''")
@@ -112,8 +112,8 @@ def check_coarse_first(browser, path):
     counted = page.value("""(() => {
       const p = regradePage, {scene, painter} = p, sum = (list) => list.filter(Boolean).reduce((all, t) => all + t.bytes, 0);
       const sets = [scene.source, ...p.colors.filter(Boolean)], {empty} = p.graphics;
-      return [p.graphics.bytes, sum([scene.tree, scene.corner, scene.base, scene.column, scene.placeOfColumn, painter.full, painter.coarse,
-              empty.u, empty.i, empty.p, ...new Set(sets.flatMap((s) => [s.color, s.texel]))])];
+      const {full, coarse} = painter, parts = [...scene.parts, ...sets.flatMap((s) => [s.color, s.texel])];
+      return [p.graphics.bytes, sum([...new Set(parts), full, full.sum, coarse, coarse.sum, empty.u, empty.i, empty.p])];
     })()""")
     if counted[0] != counted[1] or coarse <= 0:
         found.append(f"{counted[0]} bytes are on the graphics processor, and the scene needs {counted[1]}")

@@ -2,6 +2,7 @@
 """Whole runs of the program on small synthetic captures, from their beginning to the report.
 
   whole_runs.py REGRADE photos      a folder of photos without poses: COLMAP finds them
+  whole_runs.py REGRADE splats      --field splats, poses given
   whole_runs.py REGRADE paper       --preset paper, poses given; OVERRIDDEN names what is smaller, all else is to the letter
 
 Each takes about a minute on two cores. Exit status: 0, 1 with what is wrong, or 77 without COLMAP.
@@ -63,6 +64,26 @@ def from_photos(regrade, work):
         expect(os.path.getsize(os.path.join(out, name)) > 1000, f"{name} is missing or empty")
 
 
+def splats(regrade, work):
+    """A field of splats, from the fit to the page, the evaluator and other programs' file."""
+    synth(regrade, os.path.join(work, "capture"), 12, "200x150")
+    out, ply = os.path.join(work, "out"), os.path.join(work, "ply")
+    command = [regrade, "run", os.path.join(work, "capture", "truth"), "--style", STYLE, "--out", out, "--preset", "smoke",
+               "--device", "cpu", "--field", "splats", "--splat-steps", "300", "--photo-size", "200", "--style-steps", "40", "--page",
+               "on", *SHORT_FILM, "--require", "reconstruct:psnr-heldout>=20,styled:tc-psnr:1>=20"]
+    run(command)
+    fit = report_of(out)["stages"]["reconstruct"]
+    expect(fit["splats"] > 1000 and "voxels" not in fit, f"the fit is not of splats: {fit}")
+    for name in ("field.npz", STYLED + "/network.npz", STYLED + "/report.html", STYLED + "/scene.html"):
+        expect(os.path.getsize(os.path.join(out, name)) > 1000, f"{name} is missing or empty")
+    run([regrade, "export", out, "--format", "ply", "--out", ply])
+    sizes = {os.path.getsize(os.path.join(ply, name)) for name in os.listdir(ply)}
+    expect(len(os.listdir(ply)) == 2 and min(sizes) > 1000 * 100, f"splats of the scene and of its style: {os.listdir(ply)}")
+    refused = subprocess.run(command[:-2] + ["--preset", "paper"], stdin=subprocess.DEVNULL, capture_output=True, text=True,
+                             check=False)
+    expect(refused.returncode == 2 and "--field splats" in refused.stderr, f"the paper's splats: {refused.stderr}")
+
+
 def paper(regrade, work):
     """The preset of the paper, by the configuration that the capture asks for."""
     synth(regrade, os.path.join(work, "capture"), 10, "160x120")
@@ -85,12 +106,13 @@ def paper(regrade, work):
 
 
 def main():
-    if len(sys.argv) != 3 or sys.argv[2] not in ("photos", "paper"):
+    kinds = {"photos": from_photos, "splats": splats, "paper": paper}
+    if len(sys.argv) != 3 or sys.argv[2] not in kinds:
         sys.exit(__doc__)
     if sys.argv[2] == "photos" and shutil.which("colmap") is None:
         sys.exit(77)
     with tempfile.TemporaryDirectory() as work:
-        (from_photos if sys.argv[2] == "photos" else paper)(sys.argv[1], work)
+        kinds[sys.argv[2]](sys.argv[1], work)
     print("ok")
 
 

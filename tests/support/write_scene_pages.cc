@@ -11,8 +11,9 @@
 #include <filesystem>
 
 #include "kernels/base/random.h"
-#include "kernels/field/cpu/render_view.h"
 #include "kernels/field/pad_sh_basis.h"
+#include "kernels/render/field_renderer.h"
+#include "kernels/splats/splat_field.h"
 #include "pipeline/capture/working_views.h"
 #include "pipeline/fields/field_file.h"
 #include "pipeline/fields/network_file.h"
@@ -30,6 +31,7 @@
 #include "stylize/training/initial_network.h"
 #include "tests/support/cell_field.h"
 #include "tests/support/keyframes.h"
+#include "tests/support/small_splats.h"
 
 namespace regrade {
 namespace {
@@ -99,7 +101,7 @@ JsonValue ViewJson(const Camera& camera, double weight, const RadianceField& fie
       {"width", camera.width},
       {"height", camera.height},
       {"weights", JsonValue::Array{weight}},
-      {"pixels", Pixels(RenderView(field, camera, MarchOptions{field.step}).color)}};
+      {"pixels", Pixels(FieldRenderer(field, Backend::kCpu).Render(camera).color)}};
 }
 
 enum class Layers { kNone, kResidual, kObject };
@@ -131,10 +133,11 @@ void WritePages(const std::string& folder, const std::string& name, const Radian
   content.cameras = CamerasOf(forward_facing);
   content.field = EncodeField(field, 0.03);
   // Small fields would have none.
-  if (const auto coarse = CoarseField(field, {.most_part = 10}))
+  if (const auto coarse =
+          field.geometry->splats.on() ? std::nullopt : CoarseField(field, {.most_part = 10}))
     content.coarse = EncodeField(*coarse, 0.03);
   RadianceField page = DecodeField(content.field);
-  const PageVoxels places = VoxelsInPageOrder(content.field, *page.geometry);
+  const PageVoxels places = RecordsInPageOrder(content.field, *page.geometry);
   StyleLayers layers;
   if (kind != Layers::kNone) layers = SomeLayers(kind, places.voxel.size());
   content.styles = {EncodeStyle(Style(), page, 0.5, layers, places)};
@@ -155,6 +158,16 @@ void WritePages(const std::string& folder, const std::string& name, const Radian
   const PageCheck check{48, 50, 3};
   WriteFileAtomically(folder + "/" + name + ".html", PageHtml(content, &check));
   WriteJsonFile(folder + "/" + name + ".json", JsonValue(std::move(views)));
+}
+
+// In the box of SmallFrame and around it.
+RadianceField SplatsField() {
+  const GridFrame box{{}, {0, 0, 0}, {0.8f, 1, 0.7f}};
+  const auto splats = testing::RandomSplats(600, 9, 5, 1.3, 0.02);
+  RadianceField field = FieldOfSplats(testing::CastSplats<float>(splats), box, 0.1f, false);
+  for (int64_t i = 0; i < field.appearance.sh.size(); ++i)
+    if (i % 9 != 0) field.appearance.sh[i] *= 0.4f;
+  return field;
 }
 
 void WritePageOfRun(const std::string& folder, const std::string& run,
@@ -260,6 +273,7 @@ int main(int argc, char** argv) {
   WritePages(folder, "levels_residual", testing::RandomCellField({2, 3, 2}, 3, 9, 5), false,
              Layers::kResidual);
   WritePages(folder, "spheres_object", far, false, Layers::kObject);
+  WritePages(folder, "splats", SplatsField(), false, Layers::kResidual);
   WritePath(folder);
   WriteColorMaps(folder);
   return 0;

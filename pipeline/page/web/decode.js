@@ -30,7 +30,7 @@ function cornersOf(corner, order, voxels) {
 }
 
 // `text`: of the sections places (tree or mask), density and color. Calls progress(part).
-async function decodeField(header, text, progress) {
+async function decodeVoxels(header, text, progress) {
   const {resolution, basis} = header, onCells = header.finest !== null;
   checkCode(header.color, 'color');
   const bytes = await inflated(text.places, 'places');
@@ -66,26 +66,30 @@ async function decodeField(header, text, progress) {
     for (let s = 0, at = word; s < slots; ++s, at += 4) color[at] |= channel[voxel[s]] << unused >>> above;
     await progress(0.6 + 0.38 * (k + 1) / (3 * basis));
   });
-  // Places in 13 bits, for networks; the empty voxel has the highest bit.
+  // Places in 16 bits, for networks; the empty voxel has the highest bit.
   made.place = new Uint32Array(2 * slots);
   let halvings = 0;
-  while (Math.max(...resolution) >> halvings > 8191) ++halvings;
+  while (Math.max(...resolution) >> halvings > 65535) ++halvings;
   for (let s = 0; s < slots; ++s) {
     const v = voxel[s];
-    made.place[2 * s] = v === n ? 0 : place[3 * v] >> halvings | place[3 * v + 1] >> halvings << 13;
+    made.place[2 * s] = v === n ? 0 : place[3 * v] >> halvings | place[3 * v + 1] >> halvings << 16;
     made.place[2 * s + 1] = v === n ? 2 ** 31 : place[3 * v + 2] >> halvings;
   }
   made.positionUnit = resolution.map((r) => 2 * 2 ** halvings / r);
+  made.slots = slots;
+  made.shift = onCells ? 0 : 0.5;
   made.earlier = header.residuals ? earlier.slice() : new Int32Array(0);
   return made;
 }
+
+const decodeField = (header, text, progress) => (header.splats ? decodeSplats : decodeVoxels)(header, text, progress);
 
 // In a worker: a field for each message.
 function serveDecoder() {
   onmessage = async ({data}) => {
     try {
       const made = await decodeField(data.header, data.text, (part) => postMessage({part}));
-      postMessage({made}, ['tree', 'corner', 'base', 'voxel', 'color', 'place', 'earlier'].map((name) => made[name].buffer));
+      postMessage({made}, Object.values(made).filter(ArrayBuffer.isView).map((list) => list.buffer));
     } catch (error) {
       postMessage({error: error.message, known: error instanceof PageError || error instanceof RangeError});
     }

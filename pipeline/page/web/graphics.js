@@ -31,12 +31,18 @@ const EVERY_PIXEL = `#version 300 es
 void main() { gl_Position = vec4(gl_VertexID == 1 ? 3.0 : -1.0, gl_VertexID == 2 ? 3.0 : -1.0, 0.0, 1.0); }`;
 
 const withCode = (text) => text.replace('//@code', codeGlsl());
+const withColors = (text) => withCode(text.replace('//@colors', COLORS_GLSL));
 
 class Graphics {
   constructor(gl) {
     this.gl = gl;
     this.bytes = this.most = 0;  // of all textures and buffers, now and so far
     this.marches = {};
+    this.made = 0;  // textures so far
+    // Networks run on the cores where these draw, too; '#graphics' tests the others' way.
+    const name = gl.getParameter(gl.getExtension('WEBGL_debug_renderer_info')?.UNMASKED_RENDERER_WEBGL ?? gl.RENDERER);
+    if (location.hash === '#cores' || location.hash !== '#graphics' && /swiftshader|llvmpipe|software/i.test(name)) this.onCores = true;
+    this.floats = !!(gl.getExtension('EXT_color_buffer_float') || gl.getExtension('EXT_color_buffer_half_float'));
     this.empty = {u: this.texture('u4', new Uint32Array(4)), i: this.texture('i1', new Int32Array(1)),
                   p: this.texture('u2', new Uint32Array(2))};
     this.array = gl.createVertexArray();
@@ -47,10 +53,11 @@ class Graphics {
     const gl = this.gl, sets = count > 1 ? 3 : 1;
     const parts = `#define CELLS ${header.finest === null ? 0 : 1}\n#define SPHERES ${header.spheres ? 1 : 0}\n#define SETS ${sets}\n`;
     return this.marches[parts] ??= {sets, warm: false, ...compile(gl, [
-      [gl.VERTEX_SHADER, EVERY_PIXEL], [gl.FRAGMENT_SHADER, withCode(MARCH_GLSL).replace('\n', '\n' + parts)]])};
+      [gl.VERTEX_SHADER, EVERY_PIXEL], [gl.FRAGMENT_SHADER, withColors(MARCH_GLSL).replace('\n', '\n' + parts)]])};
   }
   // Prepares the program of another scene, or of more sets, by drawing a pixel of this one with it. False if there is nothing to do.
   prepare(scene, view, kind, count) {
+    if (scene.draw) return false;
     const gl = this.gl, program = this.marchOf(kind, count);
     if (program.warm) return false;
     const compiling = gl.getExtension('KHR_parallel_shader_compile');
@@ -71,7 +78,7 @@ class Graphics {
     gl.texStorage2D(gl.TEXTURE_2D, 1, inside, WIDTH, height);
     for (const side of [gl.TEXTURE_MIN_FILTER, gl.TEXTURE_MAG_FILTER])
       gl.texParameteri(gl.TEXTURE_2D, side, gl.NEAREST);
-    return this.taken({texture, height, kind, bytes: WIDTH * height * 4 * Number(kind[1])});
+    return this.taken({texture, height, kind, number: ++this.made, bytes: WIDTH * height * 4 * Number(kind[1])});
   }
   texture(kind, data) {
     const texels = data.length / Number(kind[1]);
@@ -125,25 +132,14 @@ class Graphics {
     gl.uniform4iv(program.at('uBits'), codes.flatMap(bitsInOrder));
   }
 
-  // `sets`: {weight, colors, background} of at most three; `view`: see camera.js.
-  draw(scene, view, sets, map, target, strip, opacityStep, count, program = this.marchOf(scene, sets.length)) {
-    const gl = this.gl, p = check(gl, program), h = scene.header, u = (name) => p.at(name);
-    p.warm = true;
-    gl.useProgram(p.program);
-    gl.bindVertexArray(this.array);
-    this.bind(p, 'uTree', 0, scene.tree);
-    this.bind(p, 'uCorner', 1, scene.corner);
-    this.bind(p, 'uBase', 2, scene.base);
-    this.bind(p, 'uColumn', 9, scene.column ?? this.empty.i);
-    const texel = new Float32Array(9), weight = [0, 0, 0];
-    const background = [0, 0, 0];
+  // What colors.glsl needs; the colour of the background. `sets`: {weight, colors} of at most three.
+  setColors(p, sets, map) {
+    const gl = this.gl, weight = [0, 0, 0], background = [0, 0, 0];
     for (let i = 0; i < 3; ++i) {
       const set = sets[i];
       this.bind(p, 'uColor' + i, 3 + i, set?.colors.color ?? this.empty.u);
-      this.bind(p, 'uTexel' + i, 10 + i, set?.colors.texel ?? this.empty.p);
       if (!set) continue;
       weight[i] = set.weight;
-      texel.set(set.colors.texelScale, 3 * i);
       for (let c = 0; c < 3; ++c) background[c] += set.weight * set.colors.background[c];
     }
     if (map) {
@@ -152,15 +148,38 @@ class Graphics {
         background[c] = Math.max(0, dot(map.matrix.slice(3 * c, 3 * c + 3), flat) + map.offset[c]);
     }
     this.setCodes(p, Array.from({length: p.sets}, (_, i) => (sets[i] ?? sets[0]).colors.code));
+    gl.uniform3fv(p.at('uWeight'), weight);
+    gl.uniformMatrix3fv(p.at('uMap'), true, map?.matrix ?? [1, 0, 0, 0, 1, 0, 0, 0, 1]);
+    gl.uniform3fv(p.at('uOffset'), map?.offset ?? [0, 0, 0]);
+    return background;
+  }
+  setView(p, view, width, height) {
+    const gl = this.gl;
+    gl.uniformMatrix3fv(p.at('uWorldFromCamera'), true, view.rotation);
+    gl.uniform3fv(p.at('uEye'), view.eye);
+    gl.uniform4fv(p.at('uLens'), view.lens);
+    gl.uniform2f(p.at('uSize'), width, height);
+  }
+
+  // `sets`: see setColors; `view`: see camera.js. Of splats, which have a draw of their own, in the order that they are in.
+  draw(scene, view, sets, map, target, strip, opacityStep, count, program = scene.draw ? null : this.marchOf(scene, sets.length)) {
+    if (scene.draw) return scene.draw(view, sets, map, target, strip);
+    const gl = this.gl, p = check(gl, program), h = scene.header, u = (name) => p.at(name);
+    p.warm = true;
+    gl.useProgram(p.program);
+    gl.bindVertexArray(this.array);
+    this.bind(p, 'uTree', 0, scene.tree);
+    this.bind(p, 'uCorner', 1, scene.corner);
+    this.bind(p, 'uBase', 2, scene.base);
+    this.bind(p, 'uColumn', 9, scene.column ?? this.empty.i);
+    const texel = new Float32Array(9), background = this.setColors(p, sets, map);
+    for (let i = 0; i < 3; ++i) {
+      this.bind(p, 'uTexel' + i, 10 + i, sets[i]?.colors.texel ?? this.empty.p);
+      if (sets[i]) texel.set(sets[i].colors.texelScale, 3 * i);
+    }
+    this.setView(p, view, target.width, target.height);
     gl.uniform1fv(u('uTexelScale'), texel);
-    gl.uniform3fv(u('uWeight'), weight);
     gl.uniform3fv(u('uBackground'), background);
-    gl.uniformMatrix3fv(u('uMap'), true, map?.matrix ?? [1, 0, 0, 0, 1, 0, 0, 0, 1]);
-    gl.uniform3fv(u('uOffset'), map?.offset ?? [0, 0, 0]);
-    gl.uniformMatrix3fv(u('uWorldFromCamera'), true, view.rotation);
-    gl.uniform3fv(u('uEye'), view.eye);
-    gl.uniform4fv(u('uLens'), view.lens);
-    gl.uniform2f(u('uSize'), target.width, target.height);
     gl.uniform2fv(u('uNdc'), h.ndc ?? [0, 0]);
     gl.uniform3iv(u('uVoxels'), h.resolution);
     gl.uniform3iv(u('uTop'), scene.top);
@@ -183,18 +202,21 @@ class Graphics {
   }
 
   // A picture of RGBA8 to draw into.
-  target(width, height) {
+  target(width, height, format = this.gl.RGBA8) {
     const gl = this.gl, texture = gl.createTexture(), framebuffer = gl.createFramebuffer();
     gl.bindTexture(gl.TEXTURE_2D, texture);
-    gl.texStorage2D(gl.TEXTURE_2D, 1, gl.RGBA8, width, height);
+    gl.texStorage2D(gl.TEXTURE_2D, 1, format, width, height);
     gl.bindFramebuffer(gl.FRAMEBUFFER, framebuffer);
     gl.framebufferTexture2D(gl.FRAMEBUFFER, gl.COLOR_ATTACHMENT0, gl.TEXTURE_2D, texture, 0);
-    const made = this.taken({texture, framebuffer, width, height, bytes: 4 * width * height, free: () => {
+    const made = this.taken({texture, framebuffer, width, height, bytes: (format === gl.RGBA8 ? 4 : 8) * width * height, free: () => {
       gl.deleteFramebuffer(framebuffer);
       this.free(made);
+      made.sum?.free();
     }});
     return made;
   }
+  // Of a picture's size, to sum what is blended: half floats, or the picture itself, which rounds each sum, where there are none.
+  sumOf(target) { return this.floats ? target.sum ??= this.target(target.width, target.height, this.gl.RGBA16F) : target; }
   // All of a picture, stretched, or the rows of a strip of one of the canvas's size.
   show(target, canvas, strip) {
     const gl = this.gl, [low, high] = strip ? [strip.y, strip.y + strip.height] : [0, target.height];

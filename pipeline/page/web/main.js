@@ -10,8 +10,9 @@ function readHeader(added) {
   if (header.format !== PAGE_FORMAT) throw new PageError('this page was made by another version of regrade');
   const numbers = (v, n) => Array.isArray(v) && v.length === n && v.every(Number.isFinite);
   const isField = (h) => numbers(h.resolution, 3) && numbers(h.center, 3) && numbers(h.radius, 3) &&
-      h.voxels > 0 && h.voxels <= 1 << 26 && [1, 4, 9].includes(h.basis) && h.resolution.every((n) => n > 0 && n <= 1 << 20) &&
-      (h.finest === null || h.finest >= 0 && h.finest <= 16);
+      h.voxels > 0 && h.voxels <= 1 << 26 && [1, 4, 9].includes(h.basis) && h.resolution.every((n) => n >= 0 && n <= 1 << 20) &&
+      (h.finest === null || h.finest >= 0 && h.finest <= 16) &&
+      (!h.splats || h.splats.coarse >= 0 && h.splats.coarse <= h.voxels && h.splats.position_step > 0);
   if (!isField(header) || header.coarse && !isField(header.coarse) || !header.cameras?.[header.home])
     throw new PageError('a part of the page is damaged: scene');
   header.styles.push(...added);
@@ -42,7 +43,6 @@ async function start(page) {
     if (page.round === round) sayUnpacked();
   });
   const graphics = new Graphics(gl);
-  if (location.hash === '#cores') graphics.onCores = true;
   // Null: the context was lost meanwhile.
   const whole = decoded.then((made) => {
     unpacked = 1;
@@ -164,9 +164,10 @@ async function start(page) {
   const pictureOfPath = async (key, width, height) => {
     const full = await whole;
     for (let i = 0; i < key.weights.length; ++i) if (key.weights[i] > 0) await load(i);
+    const at = Object.assign(Object.create(view), {eye: key.eye, forward: key.forward, top: key.up, half: key.half}).at(width, height);
+    await full.arrange?.(at);
     const target = graphics.target(width, height);
-    const at = Object.assign(Object.create(view), {eye: key.eye, forward: key.forward, top: key.up, half: key.half});
-    graphics.draw(full, at.at(width, height), setsOf(key.weights, full), state.map, target, {x: 0, y: 0, width, height}, 1 / 64, false);
+    graphics.draw(full, at, setsOf(key.weights, full), state.map, target, {x: 0, y: 0, width, height}, 1 / 64, false);
     const pixels = graphics.read(target);
     target.free();
     await wait();
@@ -268,6 +269,7 @@ async function start(page) {
   // For tests: RGBA rows from the bottom, of any view and weights; with `count` the fetches of each ray.
   page.picture = async ({rotation, eye, lens, width, height, weights: wanted, count, opacityStep = 0}) => {
     for (let i = 0; i < wanted.length; ++i) if (wanted[i] > 0) await load(i);
+    await scene.arrange?.({rotation, eye, lens});
     const target = graphics.target(width, height);
     graphics.draw(scene, {rotation, eye, lens}, setsOf(wanted), null, target, {x: 0, y: 0, width, height}, opacityStep, count);
     const pixels = graphics.read(target);

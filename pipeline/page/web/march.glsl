@@ -17,12 +17,8 @@ uniform float uTexelScale[9];
 uniform int uLayers, uResolution;
 #endif
 
-uniform mat3 uOpponent[SETS];
-uniform vec3 uHarmonics[27 * SETS], uStepOf[9 * SETS];
-uniform ivec4 uBits[7 * SETS];
-uniform vec3 uWeight, uBackground;
-uniform mat3 uMap;
-uniform vec3 uOffset;
+//@colors
+uniform vec3 uBackground;
 uniform mat3 uWorldFromCamera;
 uniform vec3 uEye;
 uniform vec4 uLens;            // focal lengths and principal point, pixels
@@ -122,40 +118,15 @@ vec4 Codes(uint w) {
   return vec4(w & 255u, w >> 8 & 255u, w >> 16 & 255u, w >> 24) - 128.0;
 }
 
-//@code
-// The products of a voxel's numbers with s, the steps times the turned harmonics.
-vec3 ColorOf(usampler2D colors, int voxel, int set, vec3 s[9]) {
-  vec3 q[9], sum = vec3(0.0);
-  Unpack(texelFetch(colors, At(voxel), 0), set, q);
+vec3 ColorAt(usampler2D colors, int voxel, int set, vec3 s[9]) {
   fetches += 1.0;
-  for (int j = 0; j < 9; ++j) sum += q[j] * s[j];
-  return sum;
-}
-
-void Harmonics(vec3 d, out float g[9]) {
-  g[0] = 0.28209479177387814;
-  g[1] = -0.4886025119029199 * d.y;
-  g[2] = 0.4886025119029199 * d.z;
-  g[3] = -0.4886025119029199 * d.x;
-  g[4] = 1.0925484305920792 * d.x * d.y;
-  g[5] = -1.0925484305920792 * d.y * d.z;
-  g[6] = 0.31539156525252005 * (2.0 * d.z * d.z - d.x * d.x - d.y * d.y);
-  g[7] = -1.0925484305920792 * d.x * d.z;
-  g[8] = 0.5462742152960396 * (d.x * d.x - d.y * d.y);
+  return ColorOf(texelFetch(colors, At(voxel), 0), set, s);
 }
 
 vec3 s0[9];
 #if SETS > 1
 vec3 s1[9], s2[9];
 #endif
-
-void Scaled(float g[9], int set, out vec3 s[9]) {
-  vec3 a = vec3(g[0], g[1], g[2]), b = vec3(g[3], g[4], g[5]), c = vec3(g[6], g[7], g[8]);
-  for (int j = 0; j < 9; ++j) {
-    int at = 27 * set + 3 * j;
-    s[j] = uStepOf[9 * set + j] * (dot(uHarmonics[at], a) + dot(uHarmonics[at + 1], b) + dot(uHarmonics[at + 2], c));
-  }
-}
 
 vec3 Shade(int cell, vec3 f, float opacity) {
   uvec4 corners = texelFetch(uCorner, At(cell), 0);
@@ -181,10 +152,10 @@ vec3 Shade(int cell, vec3 f, float opacity) {
     float w = k < 4 ? a[k] : b[k - 4];
     if (w < least) continue;
     int voxel = base + int(corners[k >> 1] >> (16 * (k & 1)) & 65535u);
-    if (uWeight.x > 0.0) y0 += w * ColorOf(uColor0, voxel, 0, s0);
+    if (uWeight.x > 0.0) y0 += w * ColorAt(uColor0, voxel, 0, s0);
 #if SETS > 1
-    if (uWeight.y > 0.0) y1 += w * ColorOf(uColor1, voxel, 1, s1);
-    if (uWeight.z > 0.0) y2 += w * ColorOf(uColor2, voxel, 2, s2);
+    if (uWeight.y > 0.0) y1 += w * ColorAt(uColor1, voxel, 1, s1);
+    if (uWeight.z > 0.0) y2 += w * ColorAt(uColor2, voxel, 2, s2);
 #endif
   }
   vec3 raw = 0.5 + uWeight.x * (uOpponent[0] * y0);

@@ -16,7 +16,7 @@ uniform vec3 uSphereScale, uStyledSphereScale;
 uniform vec3 uPosition;               // the place's unit: 2 / voxels
 uniform vec3 uConstant;               // of the colour map
 uniform mat3 uBase;
-uniform float uOmega, uPositionScale;
+uniform float uOmega, uPositionScale, uShift;
 uniform vec3 uResidualScale;
 uniform int uHasResidual, uActivation, uOnSpheres, uLayers, uResolution;
 layout(std140) uniform Layer0 { mat4 w0[128]; };
@@ -67,7 +67,7 @@ void main() {
       for (int k = 0; k < 9; ++k)
         for (int c = 0; c < 3; ++c) s[9 * c + k] += uHarmonics[3 * j + k / 3][k % 3] * channels[c];
     }
-    place = (vec3(p.x & 8191u, p.x >> 13, p.y) + (uOnSpheres == 2 ? 0.5 : 0.0)) * uPosition - 1.0;
+    place = (vec3(p.x & 65535u, p.x >> 16, p.y) + uShift) * uPosition - 1.0;
   }
   for (int i = 0; i < 3; ++i) s[27 + i] = place[i] * uPositionScale;
 

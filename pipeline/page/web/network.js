@@ -35,7 +35,12 @@ function buffersOf(graphics, layers) {
 // Numbers of voxels of the page, `words` a voxel, as those of the scene's slots, in whole rows of texels.
 async function inSlots(scene, data, words) {
   if (data.length !== words * scene.voxels) throw new PageError('the style that came has another number of voxels');
-  const voxel = await asNumbers(scene.kept.voxel), into = new Uint32Array(words * WIDTH * scene.source.color.height);
+  const into = new Uint32Array(words * WIDTH * scene.source.color.height);
+  if (!scene.kept.voxel) {  // each is its own slot
+    into.set(data);
+    return into;
+  }
+  const voxel = await asNumbers(scene.kept.voxel);
   for (let s = 0; s < voxel.length; ++s)
     if (voxel[s] < scene.voxels) for (let k = 0; k < words; ++k) into[words * s + k] = data[words * voxel[s] + k];
   return into;
@@ -44,8 +49,7 @@ async function inSlots(scene, data, words) {
 // Colours of a style, to draw the scene with; `codes`: the words of its voxels, if they are known.
 async function styleColors(graphics, scene, style, id, progress, codes = null) {
   const gl = graphics.gl;
-  graphics.network ??= check(gl, compile(gl, [[gl.VERTEX_SHADER, EVERY_PIXEL], [gl.FRAGMENT_SHADER, withCode(NETWORK_GLSL)]]));
-  const p = graphics.network, layers = await loadWeights(id), buffers = buffersOf(graphics, layers);
+  const layers = await loadWeights(id), buffers = buffersOf(graphics, layers);
   const names = ['Layer0', 'Layer1', 'Layer2', 'Layer3', 'Layer4', 'Layer5', 'Biases'];
   const {source} = scene, {height} = source.color;
   const colors = {code: checkCode(style.color, id), texelScale: style.sphere_scale ?? [1, 1, 1], background: style.background};
@@ -60,6 +64,7 @@ async function styleColors(graphics, scene, style, id, progress, codes = null) {
 
   // False if it would take long and `mayLeave` is set.
   async function pass(target, onSpheres, from, mayLeave) {
+    const p = graphics.network ??= check(gl, compile(gl, [[gl.VERTEX_SHADER, EVERY_PIXEL], [gl.FRAGMENT_SHADER, withCode(NETWORK_GLSL)]]));
     const {height} = target;
     gl.bindFramebuffer(gl.FRAMEBUFFER, framebuffer);
     gl.framebufferTexture2D(gl.FRAMEBUFFER, gl.COLOR_ATTACHMENT0, gl.TEXTURE_2D, target.texture, 0);
@@ -92,6 +97,7 @@ async function styleColors(graphics, scene, style, id, progress, codes = null) {
       gl.uniformMatrix3fv(p.at('uBase'), true, style.base);
       gl.uniform1f(p.at('uOmega'), style.omega);
       gl.uniform1f(p.at('uPositionScale'), style.position_scale);
+      gl.uniform1f(p.at('uShift'), scene.shift);
       gl.uniform1i(p.at('uActivation'), style.activation);
       gl.uniform1i(p.at('uOnSpheres'), onSpheres);
       gl.uniform1i(p.at('uLayers'), scene.header.spheres?.layers ?? 1);
@@ -114,7 +120,7 @@ async function styleColors(graphics, scene, style, id, progress, codes = null) {
     return true;
   }
   const fast = !codes && (graphics.onCores !== true || !workersRun) &&
-      await pass(colors.color, scene.header.finest === null ? 2 : 0, source.color, workersRun);
+      await pass(colors.color, 0, source.color, workersRun);
   if (!codes && !scene.coarse) graphics.onCores = !fast;
   if (!codes && !fast) await restyleOnCores(graphics, scene, style, layers, {place, residual}, colors, progress);
   if (source.texel && style.residual?.weight) {  // what is not of the object stays

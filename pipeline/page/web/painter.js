@@ -44,6 +44,9 @@ class Painter {
   // One step of work; false if there is none.
   step() {
     const begun = performance.now();
+    // Splats are drawn in the last order that there is, until they are in that of the view.
+    const order = this.scene.orderFor?.(this.pictureOf(this.full.width, this.full.height).view, () => this.change());
+    if (order && !order.any) return true;
     if (this.changed) {
       this.changed = false;
       const width = Math.max(16, Math.round(this.full.width * this.part));
@@ -59,13 +62,14 @@ class Painter {
       this.frameTime = performance.now() - begun;
       // Half of a frame of 60 Hz, smoothly.
       const wanted = Math.sqrt(14 / Math.max(this.frameTime, 1));
-      this.part = Math.max(0.12, Math.min(1, this.part * Math.max(0.7, Math.min(1.15, wanted))));
+      this.part = Math.max(order ? 0.35 : 0.12, Math.min(1, this.part * Math.max(0.7, Math.min(1.15, wanted))));
       this.rest = performance.now() + 120;
       return true;
     }
     if (this.next >= this.full.height) return false;
-    if (begun < this.rest) return true;
-    const height = Math.min(this.rows, this.full.height - this.next);
+    if (begun < this.rest || order && !order.exact) return true;
+    // Of splats each strip costs a look at all of them.
+    const height = Math.min(order ? Math.max(this.rows, this.full.height >> 1) : this.rows, this.full.height - this.next);
     const strip = {y: this.full.height - this.next - height, height};  // from the top
     this.draw(this.full, strip, this.steps.rest);
     this.graphics.settle(this.full);

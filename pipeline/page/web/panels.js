@@ -155,7 +155,8 @@ function bindPath(path, state, header, place, weights, go, changed) {
 function factsOf(header, scene, graphics, painter) {
   const number = (n) => n.toLocaleString('en');
   const rows = [
-    ['Voxels', number(header.voxels)], ['Cells', scene.coarse ? 'being unpacked' : number(scene.cells)],
+    ...header.splats ? [['Splats', number(header.voxels)]]
+        : [['Voxels', number(header.voxels)], ['Cells', scene.coarse ? 'being unpacked' : number(scene.cells)]],
     ['Size of this page', (document.documentElement.innerHTML.length / 1e6).toFixed(1) + ' MB'],
     ['On the graphics processor', (graphics.bytes / 1e6).toFixed(0) + ' MB'],
     ['Picture', painter.full.width + ' x ' + painter.full.height],

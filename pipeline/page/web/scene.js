@@ -8,12 +8,15 @@ function textOf(id) {
 
 const bytesOf = (id) => inflated(textOf(id), id);
 
-// Of a field whose sections' names begin with `prefix`: see decodeField.
+// Of a field whose sections' names begin with `prefix`: see decodeField. Of splats the prefix "coarse_" names the first ones,
+// which are a part of all.
 async function decodedField(header, prefix, inWorker, progress) {
-  const text = {places: textOf(prefix + (header.finest === null ? 'mask' : 'tree')), density: textOf(prefix + 'density'),
-                color: textOf(prefix + 'color')};
-  const {resolution, basis, finest, voxels, color} = header, residuals = header.styles?.some((s) => s.residual) ?? false;
-  const task = {header: {resolution, basis, finest, voxels, color, residuals}, text};
+  const {resolution, basis, finest, voxels, color, splats, center, radius} = header;
+  const residuals = header.styles?.some((s) => s.residual) ?? false;
+  const parts = !splats ? null : prefix ? [prefix] : ['coarse_', ''], texts = (name) => parts.map((part) => textOf(part + name));
+  const text = splats ? {shape: texts('shape'), color: texts('color')}
+      : {places: textOf(prefix + (finest === null ? 'mask' : 'tree')), density: textOf(prefix + 'density'), color: textOf(prefix + 'color')};
+  const task = {header: {resolution, basis, finest, voxels, color, splats, center, radius, residuals}, text};
   const made = inWorker && await decodedByWorker(task, progress);
   if (made) return made;
   return decodeField(task.header, text, async (part) => {
@@ -59,8 +62,9 @@ const asWords = async (blob) => new Uint32Array(await blob.arrayBuffer());
 const asNumbers = async (blob) => new Int32Array(await blob.arrayBuffer());
 
 function sceneOf(header, made, graphics) {
-  const {top, finest, cells, voxels, positionUnit} = made, slots = made.voxel.length;
-  const scene = {header, top, finest, cells, voxels, slots, positionUnit};
+  if (header.splats) return new SplatScene(header, made, graphics);
+  const {top, finest, cells, voxels, slots, positionUnit, shift} = made;
+  const scene = {header, top, finest, cells, voxels, slots, positionUnit, shift};
   scene.unit = Math.max(...[0, 1, 2].map((a) => 2 * header.radius[a] / header.resolution[a]));
   for (const [name, kind] of [['tree', 'u4'], ['corner', 'u4'], ['base', 'i1'], ['color', 'u4']]) {
     scene[name] = graphics.texture(kind, made[name]);
@@ -72,16 +76,17 @@ function sceneOf(header, made, graphics) {
     scene.kept[name] = new Blob([made[name]]);
     made[name] = null;
   }
-  scene.free = () => [scene.tree, scene.corner, scene.base, scene.color].forEach((texture) => graphics.free(texture));
+  scene.parts = [scene.tree, scene.corner, scene.base, scene.color];
+  scene.free = () => scene.parts.forEach((texture) => graphics.free(texture));
   return scene;
 }
 
 // A small field that stands for the whole one until that is there; null if the page has none.
 async function loadCoarse(header, graphics) {
-  const {coarse} = header;
+  const coarse = header.splats?.coarse > 0 ? header : header.coarse;
   if (!coarse) return null;
   const made = await decodedField(coarse, 'coarse_', false, () => {});
-  return {...sceneOf({...coarse, ndc: header.ndc, spheres: null}, made, graphics), coarse: true};
+  return Object.assign(sceneOf({...coarse, ndc: header.ndc, spheres: null}, made, graphics), {coarse: true});
 }
 
 // `made`: by decodedField.
@@ -107,6 +112,7 @@ async function loadSpheres(scene, graphics) {
   }
   scene.column = graphics.texture('i1', spheres.links);
   scene.placeOfColumn = graphics.texture('i1', spheres.place);
+  scene.parts.push(scene.column, scene.placeOfColumn);
   scene.source.texel = graphics.texture('u2', texel);
   scene.source.texelScale = header.scale;
 }

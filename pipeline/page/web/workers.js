@@ -77,9 +77,9 @@ function workerOfStyle() {
         }
         fromNumbers(from, q, s[h]);
         for (let i = 0; i < 27; ++i) floats[X + 8 * i + h] = s[h][i];
-        floats[X + 216 + h] = (((a & 8191) + task.shift) * task.unit[0] - 1) * task.positionScale;
-        floats[X + 224 + h] = (((a >>> 13) + task.shift) * task.unit[1] - 1) * task.positionScale;
-        floats[X + 232 + h] = (((b & 8191) + task.shift) * task.unit[2] - 1) * task.positionScale;
+        floats[X + 216 + h] = (((a & 65535) + task.shift) * task.unit[0] - 1) * task.positionScale;
+        floats[X + 224 + h] = (((a >>> 16) + task.shift) * task.unit[1] - 1) * task.positionScale;
+        floats[X + 232 + h] = (((b & 65535) + task.shift) * task.unit[2] - 1) * task.positionScale;
       }
       let x = X, y = Y;
       for (let l = 0; l < 6; ++l) {
@@ -138,7 +138,7 @@ async function restyleOnCores(graphics, scene, style, layers, {place, residual},
   };
   const setup = {layers, program: lanesProgram(), base: style.base, constant: style.constant, from: withPlaces(scene.source.code), to: withPlaces(colors.code),
                  omega: style.omega, activation: style.activation, positionScale: style.position_scale,
-                 residualScale: style.residual?.scale ?? [0, 0, 0], unit: scene.positionUnit, shift: scene.header.finest === null ? 0.5 : 0};
+                 residualScale: style.residual?.scale ?? [0, 0, 0], unit: scene.positionUnit, shift: scene.shift};
   let next = 0, done = 0;
   const workers = Array.from({length: Math.max(1, Math.min(8, navigator.hardwareConcurrency || 2))}, () => new Worker(url));
   try {

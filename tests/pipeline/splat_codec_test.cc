@@ -1,0 +1,160 @@
+// The codec of a page's splats: what comes out renders as what went in; damage is refused.
+#include "pipeline/page/splat_codec.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+#include <vector>
+
+#include "kernels/render/field_renderer.h"
+#include "kernels/splats/extent.h"
+#include "kernels/splats/splat_field.h"
+#include "pipeline/files/deflate.h"
+#include "pipeline/page/splat_numbers.h"
+#include "tests/support/expect_error.h"
+#include "tests/support/psnr.h"
+#include "tests/support/small_splats.h"
+
+namespace regrade {
+namespace {
+
+constexpr double kStep = 0.03;  // regrade page's
+
+RadianceField FieldOf(int64_t count, int basis, bool antialiased = false) {
+  const GridFrame box{{}, {0.1f, 0, -0.2f}, {0.8f, 1, 0.7f}};
+  Splats splats = testing::CastSplats<float>(testing::RandomSplats(count, basis, 3, 1.4, 0.03));
+  for (size_t i = 0; i < splats.sh.size(); ++i)
+    if (i % static_cast<size_t>(basis) != 0) splats.sh[i] *= 0.4f;
+  return FieldOfSplats(splats, box, 0.1f, antialiased);
+}
+
+Image Picture(const RadianceField& field) {
+  return FieldRenderer(field, Backend::kCpu).Render(testing::SplatCameraOf(64, 48)).color;
+}
+
+TEST(SplatCodec, DecodedSplatsRenderAsTheExactOnes) {
+  for (const int basis : {1, 4, 9})
+    for (const bool antialiased : {false, true}) {
+      const RadianceField field = FieldOf(800, basis, antialiased);
+      const RadianceField decoded = DecodeField(EncodeField(field, kStep));
+      EXPECT_EQ(decoded.geometry->splats.antialiased, antialiased);
+      EXPECT_GE(testing::Psnr(Picture(field), Picture(decoded)), 48) << basis;
+    }
+}
+
+// A page has harmonics of degree 2 at most.
+TEST(SplatCodec, HigherHarmonicsAreLeftOut) {
+  const RadianceField decoded = DecodeField(EncodeField(FieldOf(50, 16), kStep));
+  EXPECT_EQ(decoded.appearance.basis, 9);
+}
+
+// EQ(page-splat): half a step of each number at most, for splats far outside, too.
+TEST(SplatCodec, NumbersAreRoundedByHalfAStep) {
+  const GridFrame box{{}, {0.1f, 0, -0.2f}, {0.8f, 1, 0.7f}};
+  for (uint64_t i = 0; i < 400; ++i) {
+    Splat<float> splat;
+    const double far = std::exp(testing::Draw(1, i, 0, -2, 5));
+    double farthest = 1;
+    for (int a = 0; a < 3; ++a) {
+      const auto part = static_cast<uint64_t>(a);
+      splat.mean[a] = static_cast<float>(testing::Draw(1, i, 1 + part, -far, far));
+      splat.log_scale[a] = static_cast<float>(testing::Draw(1, i, 4 + part, -9, 2));
+      farthest = std::max(
+          farthest, std::abs(double{splat.mean[a] - box.center[a]} / double{box.radius[a]}));
+    }
+    for (uint64_t a = 0; a < 4; ++a)
+      splat.quaternion[a] = static_cast<float>(testing::Draw(1, i, 7 + a, -1, 1));
+    splat.opacity_logit = static_cast<float>(testing::Draw(1, i, 11, -4, 4));
+    const Splat<float> got = SplatOfNumbers(NumbersOfSplat(splat, box), box);
+    // The contraction's slope is 1 / m across and 1 / m^2 along the way from the box.
+    const double reach = 0.5 * kPositionStep * farthest * farthest * 3;
+    for (int a = 0; a < 3; ++a) {
+      EXPECT_NEAR(got.mean[a], splat.mean[a],
+                  (farthest > 1 ? reach : 0.5 * kPositionStep) + 1e-6);
+      EXPECT_NEAR(got.log_scale[a], splat.log_scale[a], 0.5 * kLogScaleStep + 1e-5);
+    }
+    // Half turns change columns' signs. A component's error is half a step, that of w up to
+    // sqrt(3) times as large; an entry has derivatives of at most 4 by each.
+    const Mat3f want = RotationOf(splat.quaternion), rotation = RotationOf(got.quaternion);
+    for (int k = 0; k < 3; ++k) {
+      float along = 0;
+      for (int r = 0; r < 3; ++r) along += want(r, k) * rotation(r, k);
+      EXPECT_GT(std::abs(along), 1 - 1e-4);
+      for (int r = 0; r < 3; ++r)
+        EXPECT_NEAR(rotation(r, k) * (along < 0 ? -1 : 1), want(r, k), 6 * kRotationStep);
+    }
+    const double opacity = std::exp(LogSigmoid(double{splat.opacity_logit}));
+    EXPECT_NEAR(std::exp(LogSigmoid(double{got.opacity_logit})), std::min(opacity, 255.0 / 256),
+                0.5 / kOpacitySteps + 1e-6);
+  }
+}
+
+TEST(SplatCodec, FirstComeThoseThatContributeMost) {
+  RadianceField field = FieldOf(600, 1);
+  auto geometry = std::make_shared<Geometry>(*field.geometry);
+  for (int64_t i = 0; i < 3; ++i) {  // the largest three, in the middle of the box
+    for (int a = 0; a < 3; ++a)
+      geometry->splats.mean[3 * i + a] = 0, geometry->splats.log_scale[3 * i + a] = 0;
+    geometry->splats.opacity_logit[i] = 3;
+  }
+  geometry->splats.opacity_logit[3] = -6;  // nothing of it is seen
+  field.geometry = geometry;
+  const SplatOrder order = OrderOfSplats(*geometry);
+  EXPECT_EQ(std::ssize(order.splat), 599);
+  EXPECT_EQ(std::ranges::count(order.splat, 3), 0);
+  const auto coarse_end = order.splat.begin() + order.coarse;
+  for (int64_t i = 0; i < 3; ++i)
+    EXPECT_EQ(std::count(order.splat.begin(), coarse_end, i), 1) << i;
+}
+
+// What a style adds splat by splat needs the same order from both fields.
+TEST(SplatCodec, OrderIsThatOfTheDecodedField) {
+  const RadianceField field = FieldOf(500, 4);
+  const PageField page = EncodeField(field, kStep);
+  const RadianceField decoded = DecodeField(page);
+  const PageVoxels of = RecordsInPageOrder(page, *field.geometry),
+                   own = RecordsInPageOrder(page, *decoded.geometry);
+  EXPECT_EQ(of.earlier, own.earlier);
+  std::vector<int64_t> all(own.voxel.size());
+  std::iota(all.begin(), all.end(), 0);
+  EXPECT_EQ(own.voxel, all);
+  for (const int64_t i : all)
+    for (int a = 0; a < 3; ++a)
+      EXPECT_NEAR(decoded.geometry->splats.mean[3 * i + a],
+                  field.geometry->splats.mean[3 * of.voxel[static_cast<size_t>(i)] + a], 1e-3);
+}
+
+TEST(SplatCodec, DamagedSectionsAreRefused) {
+  const PageField page = EncodeField(FieldOf(60, 4), 0.1);
+  ASSERT_EQ(page.sections.size(), 4u);
+  for (size_t s = 0; s < page.sections.size(); ++s) {
+    PageField cut = page, missing = page;
+    cut.sections[s].packed.pop_back();
+    EXPECT_REGRADE_ERROR(DecodeField(cut), ExitCode::kInput, "damaged");
+    missing.sections.erase(missing.sections.begin() + static_cast<std::ptrdiff_t>(s));
+    EXPECT_REGRADE_ERROR(DecodeField(missing), ExitCode::kInput, "is missing");
+    const std::string bytes = Inflate(page.sections[s].packed, 1 << 24, "test");
+    for (size_t k = 0; k < 40; ++k) {
+      std::string changed = bytes;
+      changed[k * bytes.size() / 40] ^= static_cast<char>(1 << (k % 8));
+      PageField damaged = page;
+      damaged.sections[s].packed = Deflate(changed);
+      try {
+        DecodeField(damaged);
+      } catch (const Error& error) {
+        EXPECT_EQ(static_cast<int>(error.code()), static_cast<int>(ExitCode::kInput));
+      }
+    }
+  }
+}
+
+TEST(SplatCodec, MoreSplatsThanThePageHasAreRefused) {
+  PageField page = EncodeField(FieldOf(60, 1), 0.1);
+  page.header["voxels"] = 50'000'000;
+  EXPECT_REGRADE_ERROR(DecodeField(page), ExitCode::kInput, "fewer splats");
+}
+
+}  // namespace
+}  // namespace regrade
