@@ -54,9 +54,9 @@ void WriteSplatPly(const std::string& path, const StoredField& stored,
   for (int64_t i = 0; i < splats.count; ++i) {
     const Splat<float> splat = splats[i];
     row.clear();
-    const Vec3d mean = world_from_field *
-                       ((splat.mean.Cast<double>() - field_from_world.translation) /
-                        field_from_world.scale);
+    const Vec3d mean =
+        world_from_field *
+        ((splat.mean.Cast<double>() - field_from_world.translation) / field_from_world.scale);
     for (int a = 0; a < 3; ++a) row.push_back(static_cast<float>(mean[a]));
     row.insert(row.end(), 3, 0.0f);
     const float* const sh = splats.Coefficients(i);

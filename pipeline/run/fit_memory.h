@@ -39,8 +39,8 @@ struct PlannedSplatFit {
   std::string notice;
 };
 
-// The same of splats: first at most one for each kPixelsOfSplat pixels of the photos; with more,
-// few photos are explained one by one, and views between them get worse.
+// The same of splats: first at most one for each kPixelsOfSplat pixels of the photos; with
+// more, few photos are explained one by one, and views between them get worse.
 inline constexpr int kPixelsOfSplat = 30;
 PlannedSplatFit SplatsWithinMemory(SplatFitOptions options, const FitPlace& place);
 

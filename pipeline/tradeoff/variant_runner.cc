@@ -173,10 +173,9 @@ const VariantRunner::Photos& VariantRunner::PhotosAt(int size) {
   photos_ = std::make_unique<Photos>(Photos{base_->Views().AtSize(size)});
   Photos& p = *photos_;
   // The box does not depend on exposures, which are known already.
-  p.scene =
-      ProfileScene(p.working_views.capture(), base_->settings.fit.sh_degree,
-                   base_->settings.Effects() + ",exposure=off", base_->settings.scene.box)
-          .scene;
+  p.scene = ProfileScene(p.working_views.capture(), base_->settings.fit.sh_degree,
+                         base_->settings.Effects() + ",exposure=off", base_->settings.scene.box)
+                .scene;
   p.working_views = p.working_views.InField(p.scene.field_from_world, p.scene.ndc);
   const std::vector<int> fitted = p.working_views.Training();
   p.pictures.reserve(fitted.size());
