@@ -92,7 +92,7 @@ class SplatScene {
     gl.drawArrays(gl.TRIANGLES, 0, 3);
     return background;
   }
-  // As Graphics.draw; the scene is in order.
+  // As Graphics.draw; the scene is in order. `few`: the splats that come first alone.
   draw(view, sets, map, target, strip) {
     const {gl} = this.graphics, programs = splatPrograms(this.graphics, sets.length), {blend, resolve} = programs;
     for (const program of [programs.see, blend, resolve]) check(gl, program);
@@ -103,6 +103,7 @@ class SplatScene {
     this.graphics.bind(blend, 'uOrder', 2, this.order);
     const count = this.ordered?.count ?? 0;
     gl.uniform1i(blend.at('uCount'), count);
+    gl.uniform1i(blend.at('uMost'), (this.few && this.header.splats.coarse) || this.voxels);
     const top = target.height - strip.y - strip.height;
     gl.uniform2f(blend.at('uSize'), target.width, target.height);
     gl.uniform4f(blend.at('uStrip'), strip.x, strip.x + strip.width, top, top + strip.height);
