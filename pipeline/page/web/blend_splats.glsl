@@ -7,7 +7,7 @@ precision highp isampler2D;
 precision highp usampler2D;
 
 uniform isampler2D uOrder;
-uniform int uCount;
+uniform int uCount, uMost;            // splats in the order; those from uMost on are left out
 uniform usampler2D uPlace, uLight;  // see see_splats.glsl
 uniform vec2 uSize;
 uniform vec4 uStrip;                // what is drawn: left, right, top and bottom, pixels
@@ -22,6 +22,7 @@ void main() {
   int i = gl_InstanceID * 1024 + (gl_VertexID >> 2);  // quads of an instance: see splats.js
   if (i >= uCount) return;
   int splat = texelFetch(uOrder, ivec2(i & 2047, i >> 11), 0).x;
+  if (splat >= uMost) return;
   ivec2 at = ivec2(splat & 2047, splat >> 11);
   uvec4 a = texelFetch(uLight, at, 0);
   float logOpacity = uintBitsToFloat(a.y);

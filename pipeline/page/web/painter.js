@@ -55,14 +55,19 @@ class Painter {
         this.coarse?.free();
         this.coarse = this.graphics.target(width, height);
       }
+      this.scene.few = this.scene.slow;
       this.draw(this.coarse, {y: 0, height}, this.steps.moving);
+      this.scene.few = false;
       this.graphics.settle(this.coarse);
       this.graphics.show(this.coarse, this.canvas, null);
       this.shown = this.scene;
       this.frameTime = performance.now() - begun;
       // Half of a frame of 60 Hz, smoothly.
       const wanted = Math.sqrt(14 / Math.max(this.frameTime, 1));
-      this.part = Math.max(order ? 0.35 : 0.12, Math.min(1, this.part * Math.max(0.7, Math.min(1.15, wanted))));
+      // Splats cost as much in a small picture: where that is slow, a few of them are drawn.
+      const least = order ? 0.35 : 0.12;
+      if (order && this.part === least && this.frameTime > 70) this.scene.slow = true;
+      this.part = Math.max(least, Math.min(1, this.part * Math.max(0.7, Math.min(1.15, wanted))));
       this.rest = performance.now() + 120;
       return true;
     }

@@ -86,7 +86,9 @@ async function loadCoarse(header, graphics) {
   const coarse = header.splats?.coarse > 0 ? header : header.coarse;
   if (!coarse) return null;
   const made = await decodedField(coarse, 'coarse_', false, () => {});
-  return Object.assign(sceneOf({...coarse, ndc: header.ndc, spheres: null}, made, graphics), {coarse: true});
+  const scene = Object.assign(sceneOf({...coarse, ndc: header.ndc, spheres: null}, made, graphics), {coarse: true});
+  scene.warm?.([0, 1].includes(header.styles[0]?.strength ?? 0) ? 1 : 2);
+  return scene;
 }
 
 // `made`: by decodedField.

@@ -52,6 +52,14 @@ class SplatScene {
     gl.deleteVertexArray(this.array);
     gl.deleteFramebuffer(this.framebuffer);
   }
+  // Begins to prepare the programs for `count` sets, which takes a while: draws nothing.
+  warm(count) {
+    const target = this.graphics.target(1, 1), sets = Array.from({length: count}, () => ({weight: 1, colors: this.source}));
+    this.draw({rotation: [1, 0, 0, 0, 1, 0, 0, 0, 1], eye: [0, 0, 0], lens: [1, 1, 0.5, 0.5]}, sets, null, target,
+              {x: 0, y: 0, width: 1, height: 1});
+    this.graphics.gl.flush();
+    target.free();
+  }
   // A promise: until something else is awaited, what is drawn next is in the order of this view.
   async arrange(view) {
     const order = await this.sorter.of(view, this.header.splats.near_plane);
@@ -92,7 +100,7 @@ class SplatScene {
     gl.drawArrays(gl.TRIANGLES, 0, 3);
     return background;
   }
-  // As Graphics.draw; the scene is in order.
+  // As Graphics.draw; the scene is in order. `few`: the splats that come first alone.
   draw(view, sets, map, target, strip) {
     const {gl} = this.graphics, programs = splatPrograms(this.graphics, sets.length), {blend, resolve} = programs;
     for (const program of [programs.see, blend, resolve]) check(gl, program);
@@ -103,6 +111,7 @@ class SplatScene {
     this.graphics.bind(blend, 'uOrder', 2, this.order);
     const count = this.ordered?.count ?? 0;
     gl.uniform1i(blend.at('uCount'), count);
+    gl.uniform1i(blend.at('uMost'), (this.few && this.header.splats.coarse) || this.voxels);
     const top = target.height - strip.y - strip.height;
     gl.uniform2f(blend.at('uSize'), target.width, target.height);
     gl.uniform4f(blend.at('uStrip'), strip.x, strip.x + strip.width, top, top + strip.height);
@@ -113,7 +122,7 @@ class SplatScene {
     gl.clearBufferfv(gl.COLOR, 0, [...background, 1]);
     gl.enable(gl.BLEND);
     gl.blendFunc(gl.ONE, gl.ONE_MINUS_SRC_ALPHA);
-    gl.drawElementsInstanced(gl.TRIANGLES, 6 * QUADS, gl.UNSIGNED_SHORT, 0, Math.ceil(count / QUADS));
+    gl.drawElementsInstanced(gl.TRIANGLES, 6 * QUADS, gl.UNSIGNED_SHORT, 0, Math.max(1, Math.ceil(count / QUADS)));
     gl.disable(gl.BLEND);
     if (sum !== target) {
       gl.useProgram(resolve.program);
