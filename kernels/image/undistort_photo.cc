@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <vector>
 
 #include "kernels/base/error.h"
 
@@ -85,6 +86,41 @@ Image UndistortPhoto(const Image& photo, const Camera& camera) {
                                   : std::numeric_limits<float>::quiet_NaN();
     }
   return result;
+}
+
+void FillBeyond(Image* photo) {
+  const int w = photo->width, h = photo->height, channels = photo->channels;
+  const auto known = [&](int x, int y) { return std::isfinite(*photo->at(x, y)); };
+  std::vector<bool> has_one(static_cast<size_t>(h));
+  for (int y = 0; y < h; ++y) {
+    std::vector<int> from(static_cast<size_t>(w),
+                          -1);  // nearest known pixel, first to the left
+    for (int x = 0, last = -1; x < w; ++x) {
+      if (known(x, y)) last = x;
+      from[static_cast<size_t>(x)] = last;
+    }
+    for (int x = w - 1, next = -1; x >= 0; --x) {
+      int& left = from[static_cast<size_t>(x)];
+      if (left == x) next = x;
+      if (next >= 0 && (left < 0 || next - x < x - left)) left = next;
+    }
+    has_one[static_cast<size_t>(y)] = from[0] >= 0;
+    for (int x = 0; x < w && from[0] >= 0; ++x)
+      if (const int at = from[static_cast<size_t>(x)]; at != x)
+        std::copy_n(photo->at(at, y), channels, photo->at(x, y));
+  }
+  for (int y = 0; y < h; ++y) {
+    if (has_one[static_cast<size_t>(y)]) continue;
+    for (int away = 1; away < h; ++away) {
+      const int above = y - away, below = y + away;
+      const int source = above >= 0 && has_one[static_cast<size_t>(above)]  ? above
+                         : below < h && has_one[static_cast<size_t>(below)] ? below
+                                                                            : -1;
+      if (source < 0) continue;
+      std::copy_n(photo->at(0, source), w * channels, photo->at(0, y));
+      break;
+    }
+  }
 }
 
 }  // namespace regrade

@@ -13,4 +13,8 @@ namespace regrade {
 // pinhole's photo is returned as it is.
 Image UndistortPhoto(const Image& photo, const Camera& camera);
 
+// Gives pixels that are NaN the colour of the nearest pixel of their row that is not, or of the
+// nearest row that has one.
+void FillBeyond(Image* photo);
+
 }  // namespace regrade

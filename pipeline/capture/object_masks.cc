@@ -56,8 +56,10 @@ std::vector<Vec3f> LabelsOf(const std::string& path) {
 
 }  // namespace
 
-ObjectMasks::ObjectMasks(const MaskOptions& options, const std::vector<std::string>& photos)
-    : style_mask_(options.style_mask),
+ObjectMasks::ObjectMasks(const MaskOptions& options, const std::vector<std::string>& photos,
+                         std::optional<WorkingViews> views)
+    : views_(std::move(views)),
+      style_mask_(options.style_mask),
       paths_(PicturesByPhotoName(options.masks, photos, "mask")) {
   if (!style_mask_.empty()) labels_ = LabelsOf(style_mask_);
 }
@@ -94,7 +96,10 @@ std::vector<Image> ObjectMasks::Regions(const std::string& path, int width, int 
 
 std::vector<Image> ObjectMasks::Coverage(int view, int width, int height) const {
   REGRADE_CHECK(Knows(view));
-  return Regions(paths_[view], width, height);
+  std::vector<Image> regions = Regions(paths_[view], width, height);
+  if (views_)
+    for (Image& region : regions) region = views_->AsSeen(view, std::move(region));
+  return regions;
 }
 
 Image ObjectMasks::StyleRegion(int region, int width, int height) const {

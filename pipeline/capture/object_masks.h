@@ -2,11 +2,13 @@
 // to them.
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "kernels/base/options.h"
 #include "kernels/scene/image.h"
+#include "pipeline/capture/working_views.h"
 #include "pipeline/files/json_file.h"
 
 namespace regrade {
@@ -49,7 +51,9 @@ class ObjectMasks {
   // `photos`: the user's names of the views' files. Throws Error(kInput) for a missing
   // folder, one without a picture of a photo's name, a style mask without colours or with more
   // than kMostRegions.
-  ObjectMasks(const MaskOptions& options, const std::vector<std::string>& photos);
+  // With `views` the masks are as its cameras see them, see WorkingViews::AsSeen.
+  ObjectMasks(const MaskOptions& options, const std::vector<std::string>& photos,
+              std::optional<WorkingViews> views = {});
 
   static constexpr int kMostRegions = 16;
 
@@ -66,6 +70,7 @@ class ObjectMasks {
  private:
   std::vector<Image> Regions(const std::string& path, int width, int height) const;
 
+  std::optional<WorkingViews> views_;
   std::string style_mask_;
   std::vector<std::string> paths_;  // one for each photo; empty without a mask
   std::vector<Vec3f> labels_;       // of the style mask, in order of appearance

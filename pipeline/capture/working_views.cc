@@ -70,6 +70,12 @@ WorkingViews WorkingViews::Pinholes() const {
   return views;
 }
 
+WorkingViews WorkingViews::Lenses() const {
+  WorkingViews views = *this;
+  views.pinholes_ = false;
+  return views;
+}
+
 WorkingViews WorkingViews::InField(const StoredField& stored) const {
   const WorkingViews views = InField(stored.field_from_world, stored.ndc);
   return stored.field.geometry->splats.on() ? views.Pinholes() : views;
@@ -118,11 +124,7 @@ Image WorkingViews::Photo(int i) const {
                      view.path, "the staged photo was changed: use --restart-from pose");
   if (photo.channels != 3) throw InputError("not an RGB picture", view.path);
   photo = AtWorkingSize(std::move(photo), photo_size_);
-  if (IsUndistorted(i)) {
-    photo = UndistortPhoto(photo, LensOf(i));
-    for (float& value : photo.pixels)
-      if (!std::isfinite(value)) value = 0;
-  }
+  photo = AsSeen(i, std::move(photo));
   UndoGain(gains_.Of(i), &photo);
   return photo;
 }
@@ -154,6 +156,13 @@ Image WorkingViews::PhotoToFit(int i) const {
   Image photo = Photo(i);
   LeaveOutMasked(i, &photo);
   return HasColor(photo) ? photo : Image();
+}
+
+Image WorkingViews::AsSeen(int i, Image picture) const {
+  if (!IsUndistorted(i)) return picture;
+  Image seen = UndistortPhoto(picture, LensOf(i).Resized(picture.width, picture.height));
+  FillBeyond(&seen);
+  return seen;
 }
 
 WorkingViews ReadWorkingViews(const std::string& poses, int photo_size, int holdout) {

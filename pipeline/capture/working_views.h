@@ -34,6 +34,8 @@ class WorkingViews {
   WorkingViews InField(const StoredField& stored) const;
   // Photos are undistorted, and what they do not show is masked.
   WorkingViews Pinholes() const;
+  // The photos' own lenses.
+  WorkingViews Lenses() const;
   WorkingViews WithGains(PhotoGains gains) const;
   WorkingViews AsTaken() const { return WithGains({}); }
   WorkingViews AtSize(int photo_size) const;
@@ -58,6 +60,9 @@ class WorkingViews {
   Image Mask(int i) const;
   // Sets masked pixels of a picture of that size to NaN: they are neither fitted nor measured.
   void LeaveOutMasked(int i, Image* picture) const;
+  // A picture in the pixels of photo i, of any size, as CameraOf(i) sees it: undistorted where
+  // photos are, with the nearest colours beyond the photo.
+  Image AsSeen(int i, Image picture) const;
   // Photo without what is masked; empty (0 x 0) where nothing is left of it.
   Image PhotoToFit(int i) const;
 

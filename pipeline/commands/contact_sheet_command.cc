@@ -95,7 +95,7 @@ Scene ReadScene(const Workspace& workspace, const SheetOptions& sheet,
     scene.photos.push_back(scene.views.Photo(i));
     scene.kept.push_back(scene.views.Mask(i));
   }
-  scene.object = OpenObjectMasks(settings, scene.views.capture());
+  scene.object = OpenObjectMasks(settings, scene.views);
   if (scene.object != nullptr)
     scene.weights = VoteForObject(settings, scene.views, scene.training_views, *scene.object,
                                   scene.stored.field, nullptr);
@@ -131,7 +131,9 @@ StyledPhotos StylePhotos(const Scene& scene, ViewStylizer* stylizer, const std::
         if (!renderer) renderer.emplace(field, Backend::kCpu);
         FillMasked(scene.kept[n], renderer->Render(scene.cameras[n]).color, &photo);
       }
-      return styled.pictures[n] = Clipped(stylizer->Stylize(photo, i));
+      Image picture = stylizer->Stylize(photo, i);
+      if (!stylizer->StylesAnything()) picture = scene.views.AsSeen(i, std::move(picture));
+      return styled.pictures[n] = Clipped(std::move(picture));
     };
     styled.targets.Add({i, scene.cameras[n],
                         name + " on " + scene.views.capture().views[n].file, scene.kept[n],

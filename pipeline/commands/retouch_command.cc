@@ -193,10 +193,17 @@ void RunRetouch(const Command& command, const Arguments& arguments, Console* con
   if (writes_render && settings.start.dry_run)
     return console->Info("would write " + workspace.Path(render));
   if (writes_render) return WriteRender(workspace.NewPath(render), view, &context);
-  const Image photo = BeforeEdit(retouch, workspace.Path(render), views.Photo(view));
-  const PhotoEdit edit =
-      AnalyseEdit(photo, EditAtPhotoSize(Colors(DecodePhoto(retouch.edited, AnySize()).image),
-                                         photo, retouch.edited));
+  // A photo is edited as it was taken; a render is what the scene's cameras see.
+  const bool as_taken = retouch.from == "photo";
+  const WorkingViews own = as_taken ? views.Lenses() : views;
+  Image photo = BeforeEdit(retouch, workspace.Path(render), own.Photo(view));
+  Image edited = EditAtPhotoSize(Colors(DecodePhoto(retouch.edited, AnySize()).image), photo,
+                                 retouch.edited);
+  if (as_taken) {
+    photo = views.AsSeen(view, std::move(photo));
+    edited = views.AsSeen(view, std::move(edited));
+  }
+  const PhotoEdit edit = AnalyseEdit(photo, edited);
   const std::vector<std::string> notices = EditNotices(edit, retouch.keep_vignette);
   for (const std::string& notice : notices) console->Info(notice);
   settings.render.vignette = retouch.keep_vignette ? VignetteText(edit.vignette) : "none";

@@ -15,11 +15,11 @@ static_assert(ObjectMasks::kMostRegions == kMostObjectRegions);
 }  // namespace
 
 std::unique_ptr<ObjectMasks> OpenObjectMasks(const RunSettings& settings,
-                                             const Capture& capture) {
+                                             const WorkingViews& views) {
   if (!settings.object.On()) return nullptr;
   std::vector<std::string> photos;
-  for (const CaptureView& view : capture.views) photos.push_back(view.file);
-  return std::make_unique<ObjectMasks>(settings.object, photos);
+  for (const CaptureView& view : views.capture().views) photos.push_back(view.file);
+  return std::make_unique<ObjectMasks>(settings.object, photos, views);
 }
 
 ObjectWeights VoteForObject(const RunSettings& settings, const WorkingViews& working_views,

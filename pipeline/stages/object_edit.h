@@ -16,9 +16,9 @@
 
 namespace regrade {
 
-// The masks that --masks names, of the capture's photos; null where the whole scene is styled.
+// The masks that --masks names, as the views see them; null where the whole scene is styled.
 std::unique_ptr<ObjectMasks> OpenObjectMasks(const RunSettings& settings,
-                                             const Capture& capture);
+                                             const WorkingViews& views);
 
 // See EQ(mask-vote); the masks of `views` vote.
 ObjectWeights VoteForObject(const RunSettings& settings, const WorkingViews& working_views,

@@ -132,7 +132,7 @@ StageOutcome Render(RunContext* context, const ProgressFunction& progress) {
   // In NDC the field's limit is no distance.
   SeenByFewRecorder seen(views, before.ndc.on() ? 0 : before.field.near_clip);
   const FilmPath path = PathOf(views, settings.render, &before.field);
-  const std::unique_ptr<ObjectMasks> masks = OpenObjectMasks(settings, views.capture());
+  const std::unique_ptr<ObjectMasks> masks = OpenObjectMasks(settings, views);
   FrameRenderers renderers;
   if (masks != nullptr)
     renderers.object = std::make_unique<CoverageRenderer>(

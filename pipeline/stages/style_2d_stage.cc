@@ -55,7 +55,7 @@ StageOutcome StyleViews(RunContext* context, const ProgressFunction& progress) {
   Workspace& workspace = *context->style;
   const WorkingViews views = context->Views();
   const Capture& capture = views.capture();
-  const std::unique_ptr<ObjectMasks> masks = OpenObjectMasks(settings, capture);
+  const std::unique_ptr<ObjectMasks> masks = OpenObjectMasks(settings, views);
   const std::unique_ptr<ViewStylizer> stylizer = MakeSceneStylizer(
       context, views, masks.get(),
       [&](const Image& view, int i) { return masks->Coverage(i, view.width, view.height); });
@@ -76,7 +76,10 @@ StageOutcome StyleViews(RunContext* context, const ProgressFunction& progress) {
     ++styled;
     Image photo = views.Photo(i);
     filler.Fill(i, &photo);
-    WritePng8(workspace.NewPath("views_2d/" + FrameName(i)), stylizer->Stylize(photo, i));
+    Image picture = stylizer->Stylize(photo, i);
+    // A finished picture is one of the photo as it was taken.
+    if (!stylizer->StylesAnything()) picture = views.AsSeen(i, std::move(picture));
+    WritePng8(workspace.NewPath("views_2d/" + FrameName(i)), picture);
   }
   StageOutcome outcome;
   outcome.outputs = {"views_2d"};
@@ -97,7 +100,8 @@ Stage Style2dStage(RunContext* context) {
   if (!files.IsNull()) stage.inputs["method_files"] = files;
   const JsonValue gains = StoredGainRows(context->workspace->Path("poses"));
   if (!gains.IsNull()) stage.inputs["exposure"] = gains;
-  if (std::filesystem::is_directory(context->workspace->Path("poses/masks")))
+  if (std::filesystem::is_directory(context->workspace->Path("poses/masks")) ||
+      context->settings.scene.UsesSplats())
     stage.inputs["field"] = context->ResultOf("reconstruct");
   if (context->settings.object.On()) {
     stage.inputs["object"] = OptionValues(context->settings.object);

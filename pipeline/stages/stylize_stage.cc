@@ -138,7 +138,7 @@ StageOutcome Stylize(RunContext* context, const JsonValue& inputs,
   ProgressParts parts(progress, 1 + (settings.object.On() ? kVoting : 0) +
                                     (settings.residual.On() ? kOfResidual : 0));
   const std::vector<int> indices = StyledViews(workspace, views);
-  const std::unique_ptr<ObjectMasks> object = OpenObjectMasks(settings, views.capture());
+  const std::unique_ptr<ObjectMasks> object = OpenObjectMasks(settings, views);
   ObjectWeights weights;
   if (object != nullptr)
     weights =
