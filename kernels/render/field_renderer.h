@@ -5,39 +5,12 @@
 #include <string>
 
 #include "kernels/device/backend.h"
-#include "kernels/field/cpu/render_view.h"
 #include "kernels/field/radiance_field.h"
-#include "kernels/field/render.h"
+#include "kernels/render/splat_renderer.h"
+#include "kernels/render/voxel_renderer.h"
 #include "kernels/scene/camera.h"
 
 namespace regrade {
-
-// Of the fast renderers of voxels: the transmittance at which a ray ends; on a GPU the step of
-// opacity at which a colour of a uniform field is evaluated, see EQ(opacity-steps); on the CPU
-// the tolerance of EQ(smooth-pixels). Errors and times are in COSTS.md.
-inline constexpr float kFastStop = 1e-3f, kFastOpacityStep = 1.0f / 128,
-                       kSmoothTolerance = 1.5f / 255;
-inline constexpr char kFastRendererOfGpu[] =
-    "a uniform field in half precision, steps where opacity changes by 1/128; of an adaptive "
-    "field, colours of vertices; at least 55 dB from the exact frames";
-inline constexpr char kFastRendererOfCpu[] =
-    "smooth parts interpolated between rays; at least 55 dB from the exact frames";
-
-// What renders one kind of field; see FieldRenderer, which has one of two.
-class KindRenderer {
- public:
-  virtual ~KindRenderer() = default;
-  virtual RenderedView Render(const Camera& camera) const = 0;
-  virtual RenderedPair RenderWith(const KindRenderer& other, const Camera& camera) const = 0;
-  virtual std::string PrepareFast() = 0;
-  virtual void ForgetFast() = 0;
-  virtual RenderedPair RenderFastWith(const KindRenderer& other,
-                                      const Camera& camera) const = 0;
-  virtual std::string FastText() const = 0;
-};
-
-std::unique_ptr<KindRenderer> MakeVoxelRenderer(const RadianceField& field, Backend backend);
-std::unique_ptr<KindRenderer> MakeSplatRenderer(const RadianceField& field, Backend backend);
 
 class FieldRenderer {
  public:

@@ -1,5 +1,6 @@
+#include "kernels/render/splat_renderer.h"
+
 #include "kernels/base/error.h"
-#include "kernels/render/field_renderer.h"
 #include "kernels/splats/cpu/render_splats.h"
 #include "kernels/splats/cuda/device_splat_renderer.h"
 #include "kernels/splats/rendered_splats.h"

@@ -1,10 +1,11 @@
+#include "kernels/render/voxel_renderer.h"
+
 #include "kernels/base/error.h"
 #include "kernels/field/cpu/render_film.h"
 #include "kernels/field/cuda/device_grid.h"
 #include "kernels/field/cuda/device_rays.h"
 #include "kernels/field/cuda/half_grid.h"
 #include "kernels/field/packed_grid.h"
-#include "kernels/render/field_renderer.h"
 
 namespace regrade {
 namespace {

@@ -18,8 +18,6 @@ namespace {
 
 constexpr int kSilhouetteSide = 512;
 constexpr double kAlphaFraction = 0.02;  // of the pixels; less is a photo with a soft edge
-constexpr const char* kNames[] = {"ndc",      "alpha",         "background",
-                                  "exposure", kViewDependence, kPoseRefinement};
 
 EffectReport Row(const char* name, bool on, double value, double threshold,
                  const std::string& evidence) {
@@ -120,27 +118,6 @@ void ProfileExposure(const Capture& capture, const std::map<std::string, bool>& 
 
 bool ShowsThroughPhotos(const Capture& capture) {
   return TransparentFraction(ReadSilhouettes(capture)) > kAlphaFraction;
-}
-
-std::map<std::string, bool> ParseEffects(const std::string& text) {
-  std::map<std::string, bool> overrides;
-  for (size_t begin = 0; begin <= text.size();) {
-    const size_t end = std::min(text.find(',', begin), text.size());
-    const std::string word = text.substr(begin, end - begin);
-    begin = end + 1;
-    if (word == "auto") continue;
-    const size_t equals = word.find('=');
-    const std::string name = word.substr(0, equals);
-    const std::string value = equals == std::string::npos ? "" : word.substr(equals + 1);
-    const bool known = std::ranges::find(kNames, name) != std::end(kNames);
-    if (!known || (value != "on" && value != "off"))
-      throw UsageError(
-          "'" + word + "' is not allowed", "--effects",
-          "auto, or on|off of ndc, alpha, background, exposure, view-dependence and "
-          "pose-refinement: ndc=on,exposure=off");
-    overrides[name] = value == "on";
-  }
-  return overrides;
 }
 
 SceneProfile ProfileScene(const Capture& capture, int sh_degree, const std::string& effects,

@@ -1,11 +1,11 @@
 // Decides from measurements of a capture which effects to model, and the field's frame and box.
 #pragma once
 
-#include <map>
 #include <string>
 #include <vector>
 
 #include "kernels/scene/capture.h"
+#include "pipeline/capture/effect_words.h"
 #include "pipeline/capture/photo_gains.h"
 #include "pipeline/files/json_file.h"
 #include "pipeline/workspace/metric.h"
@@ -13,15 +13,6 @@
 #include "reconstruct/scene/normalize_scene.h"
 
 namespace regrade {
-
-// Parses --effects: "auto", or overrides such as "ndc=off,alpha=on". Throws Error(kUsage)
-// naming the word for anything else.
-std::map<std::string, bool> ParseEffects(const std::string& text);
-
-// Decided by the fit's trial (choose_degree.h).
-inline constexpr char kViewDependence[] = "view-dependence";
-// Decided by stage "pose" (pose_profile.h).
-inline constexpr char kPoseRefinement[] = "pose-refinement";
 
 struct SceneProfile {
   // One row per effect:

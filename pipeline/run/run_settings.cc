@@ -4,7 +4,7 @@
 #include <iterator>
 
 #include "kernels/base/error.h"
-#include "pipeline/capture/scene_profile.h"
+#include "pipeline/capture/effect_words.h"
 #include "pipeline/images/cube_file.h"
 #include "pipeline/run/paper_config.h"
 #include "pipeline/run/vignette.h"

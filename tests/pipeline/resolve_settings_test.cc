@@ -201,7 +201,7 @@ TEST(OptionValues, AreFreeOfHeadings) {
   reworded.Add("Photos and frames", &scene);
   reworded.Add("Reconstruction", &fit);
   EXPECT_EQ(DumpJson(OptionValues(scene, fit)), DumpJson(reworded.Values()));
-  EXPECT_EQ(OptionValues(scene).AsObject().size(), 5u);
+  EXPECT_EQ(OptionValues(scene).AsObject().size(), 6u);
   EXPECT_EQ(OptionValues(scene).At("photo-size").AsInt(), 800);
 }
 

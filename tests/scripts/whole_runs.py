@@ -79,8 +79,8 @@ def splats(regrade, work):
     run([regrade, "export", out, "--format", "ply", "--out", ply])
     sizes = {os.path.getsize(os.path.join(ply, name)) for name in os.listdir(ply)}
     expect(len(os.listdir(ply)) == 2 and min(sizes) > 1000 * 100, f"splats of the scene and of its style: {os.listdir(ply)}")
-    refused = subprocess.run(command[:-2] + ["--preset", "paper"], stdin=subprocess.DEVNULL, capture_output=True, text=True,
-                             check=False)
+    refused = subprocess.run(["paper" if word == "smoke" else word for word in command], stdin=subprocess.DEVNULL,
+                             capture_output=True, text=True, check=False)
     expect(refused.returncode == 2 and "--field splats" in refused.stderr, f"the paper's splats: {refused.stderr}")
 
 
