@@ -35,7 +35,9 @@ void ToSphereGeometry(const FastSpheres& spheres, SphereGeometry* geometry,
 }
 
 FastGrid MakeFastGrid(const RadianceField& field) {
-  REGRADE_CHECK(!field.geometry->splats.on());
+  if (field.geometry->splats.on())
+    throw UsageError("this is done with voxels alone", "a field of splats",
+                     "fit the scene with --field voxels");
   FastGrid grid;
   const Geometry& geometry = *field.geometry;
   grid.frame = geometry.frame;

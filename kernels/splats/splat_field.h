@@ -7,9 +7,9 @@
 
 namespace regrade {
 
-// The near plane lies at half of the near clip, so that what a photo shows is not cut off where
-// a later camera is a little nearer; and at least at a thousandth of the box, whose half
-// extents are `radius`.
+// Of the fit and of the field that it leaves. The near plane lies at half of the near clip, so
+// that what a photo shows is not cut off where a later camera is a little nearer; and at least
+// at a thousandth of the box, whose half extents are `radius`.
 SplatOptions SplatOptionsFor(float near_clip, const Vec3f& radius, bool antialiased);
 
 // For geometry alone: a view of basis 0, without coefficients.

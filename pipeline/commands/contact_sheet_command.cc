@@ -7,8 +7,6 @@
 #include <optional>
 
 #include "kernels/base/error.h"
-#include "kernels/field/cpu/render_view.h"
-#include "kernels/field/packed_grid.h"
 #include "kernels/field/pad_sh_basis.h"
 #include "kernels/render/field_renderer.h"
 #include "pipeline/capture/working_views.h"

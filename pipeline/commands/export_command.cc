@@ -7,8 +7,6 @@
 #include <utility>
 
 #include "kernels/base/error.h"
-#include "kernels/field/cpu/render_view.h"
-#include "kernels/field/packed_grid.h"
 #include "kernels/render/field_renderer.h"
 #include "pipeline/capture/transforms_json.h"
 #include "pipeline/capture/working_views.h"

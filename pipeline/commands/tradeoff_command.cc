@@ -324,7 +324,7 @@ void RunTradeoff(const Command& command, const Arguments& arguments, Console* co
   }
   CheckWords(command, words, 1, 1);
   CheckOptions(settings, tradeoff);
-  CheckTogether(settings);
+  CheckTradeoff(settings);
   base.source = AbsolutePath(words[0]);
   const CaptureSource source = base.Source();
   const bool style = !settings.style.pictures.empty();

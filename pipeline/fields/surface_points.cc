@@ -7,8 +7,6 @@
 #include <unordered_set>
 
 #include "kernels/base/error.h"
-#include "kernels/field/cpu/render_view.h"
-#include "kernels/field/packed_grid.h"
 #include "kernels/render/field_renderer.h"
 #include "pipeline/files/atomic_file.h"
 

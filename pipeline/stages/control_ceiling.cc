@@ -3,8 +3,6 @@
 #include <utility>
 
 #include "kernels/base/error.h"
-#include "kernels/field/cpu/render_view.h"
-#include "kernels/field/packed_grid.h"
 #include "kernels/render/field_renderer.h"
 #include "stylize/field/coefficient_fit.h"
 

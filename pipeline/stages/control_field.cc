@@ -4,8 +4,6 @@
 #include <filesystem>
 #include <memory>
 
-#include "kernels/field/cpu/render_view.h"
-#include "kernels/field/packed_grid.h"
 #include "kernels/render/field_renderer.h"
 #include "pipeline/fields/network_file.h"
 #include "pipeline/program/device_choice.h"

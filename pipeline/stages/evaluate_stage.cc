@@ -14,8 +14,6 @@
 #include "evaluate/protocols.h"
 #include "evaluate/tables.h"
 #include "kernels/base/error.h"
-#include "kernels/field/cpu/render_view.h"
-#include "kernels/field/packed_grid.h"
 #include "kernels/render/field_renderer.h"
 #include "kernels/scene/common_camera.h"
 #include "pipeline/capture/working_views.h"

@@ -4,8 +4,6 @@
 #include <cmath>
 
 #include "evaluate/fidelity.h"
-#include "kernels/field/cpu/render_view.h"
-#include "kernels/field/packed_grid.h"
 #include "kernels/image/color_statistics.h"
 #include "kernels/render/field_renderer.h"
 #include "pipeline/stages/frame_gains.h"

@@ -1,7 +1,6 @@
 #include "pipeline/stages/object_edit.h"
 
 #include "kernels/base/error.h"
-#include "kernels/field/cpu/render_view.h"
 #include "stylize/field/object_weights.h"
 
 namespace regrade {

@@ -6,7 +6,6 @@
 #include <string>
 #include <vector>
 
-#include "kernels/field/packed_grid.h"
 #include "kernels/field/radiance_field.h"
 #include "kernels/render/field_renderer.h"
 #include "kernels/scene/capture.h"

@@ -79,11 +79,4 @@ std::unique_ptr<FieldFit> MakeSplatFit(const RunSettings& settings, const FitPla
   return std::make_unique<SplatFit>(settings, place);
 }
 
-std::unique_ptr<FieldFit> MakeFieldFit(const RunSettings& settings, const FitPlace& place) {
-  return settings.scene.UsesSplats() ? MakeSplatFit(settings, place)
-                                     : MakeVoxelFit(settings, place);
-}
-
-double RoundedForChart(double value) { return std::round(value * 1000) / 1000; }
-
 }  // namespace regrade

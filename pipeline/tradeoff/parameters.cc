@@ -151,4 +151,11 @@ std::vector<Variant> VariantsOf(const RunSettings& base, const ParameterChoice& 
   return variants;
 }
 
+void CheckTradeoff(const RunSettings& settings) {
+  CheckTogether(settings);
+  if (settings.scene.UsesSplats())
+    throw UsageError("it varies fits of voxels", "--field splats",
+                     "leave it out, or time `regrade run` with other --splat-steps");
+}
+
 }  // namespace regrade

@@ -42,6 +42,10 @@ struct ParameterChoice {
   std::vector<std::string> presets;
 };
 
+// Throws Error(kUsage) for settings that contradict each other, and for a field of splats,
+// whose fits have no variants.
+void CheckTradeoff(const RunSettings& settings);
+
 // The base of each benchmark, then each parameter's values from cheap to accurate. Values are
 // relative to the base's: half and twice its steps, a coarser and a finer grid. Throws
 // Error(kUsage) for an unknown name in `only`.

@@ -12,6 +12,7 @@
 #include "kernels/base/random.h"
 #include "kernels/base/random_streams.h"
 #include "kernels/field/spherical_harmonics.h"
+#include "kernels/splats/splat_field.h"
 #include "reconstruct/splats/initial_splats.h"
 #include "reconstruct/splats/splat_engine.h"
 
@@ -27,7 +28,7 @@ class SplatFitter {
   SplatFitter(const std::vector<TrainingView>& views, const SceneBox& box,
               const SplatFitOptions& options, const SplatFitHooks& hooks, Backend backend)
       : views_(views), box_(box), options_(options), hooks_(hooks), photos_(views) {
-    const SplatOptions render = SplatOptionsFor(box, options.antialiased);
+    const SplatOptions render = SplatOptionsFor(box.near_clip, box.radius, options.antialiased);
     engine_ =
         backend == Backend::kCuda ? MakeCudaSplatEngine(render) : MakeCpuSplatEngine(render);
     extent_ = static_cast<float>(SceneExtent(photos_, box));
@@ -227,14 +228,6 @@ class SplatFitter {
 };
 
 }  // namespace
-
-SplatOptions SplatOptionsFor(const SceneBox& box, bool antialiased) {
-  SplatOptions options;
-  const double longest = std::max({box.radius.x, box.radius.y, box.radius.z});
-  options.near_plane = std::max(0.5 * box.near_clip, 1e-3 * longest);
-  options.antialiased = antialiased;
-  return options;
-}
 
 SplatFitResult FitSplats(const std::vector<TrainingView>& views, const SceneBox& box,
                          const SplatFitOptions& options, const SplatFitHooks& hooks,

@@ -7,7 +7,6 @@
 
 #include "kernels/base/progress.h"
 #include "kernels/device/backend.h"
-#include "kernels/splats/splat_camera.h"
 #include "kernels/splats/splats.h"
 #include "reconstruct/fit/training_rays.h"
 #include "reconstruct/scene/scene_box.h"
@@ -56,9 +55,6 @@ struct SplatFitHooks {
   SplatFitState* resume = nullptr;            // moved from
   std::function<void(const SplatFitState&)> checkpoint;
 };
-
-// Of the field's pictures, fitted and later ones: the near plane is half of the near clip.
-SplatOptions SplatOptionsFor(const SceneBox& box, bool antialiased);
 
 // With fewer than 15000 steps, rates of means, scales and colours and the growth are larger by
 // the 0.3th power of the ratio, and the last rate of means by the ratio, up to 10.

@@ -9,8 +9,10 @@
 #include <utility>
 #include <vector>
 
+#include "kernels/render/field_renderer.h"
 #include "kernels/splats/cpu/render_splats.h"
 #include "kernels/splats/cuda/device_splat_renderer.h"
+#include "kernels/splats/splat_field.h"
 #include "tests/support/device_test.h"
 #include "tests/support/record_error.h"
 #include "tests/support/small_splats.h"
@@ -252,6 +254,26 @@ TEST_F(DeviceSplatsTest, AnyRunGivesTheSameBits) {
       EXPECT_TRUE(testing::RecordSameBits("picture and gradient", testing::Computed::kGpu,
                                           first[count] == all));
     }
+}
+
+// As films are rendered: a field and its styled copy, of which the host keeps no colours.
+TEST_F(DeviceSplatsTest, AFieldAndItsStyleAreRenderedAsOnTheHost) {
+  const GridFrame box{{}, {0, 0, 0}, {1, 1, 1}};
+  const RadianceField field =
+      FieldOfSplats(CastSplats<float>(RandomSplats(400, 9, 104)), box, 0.1f, false);
+  RadianceField styled = field;
+  for (int64_t i = 0; i < styled.appearance.sh.size(); ++i) styled.appearance.sh[i] *= -0.5f;
+  const Camera camera = SplatCameraOf(75, 50);
+  const FieldRenderer host(field, Backend::kCpu), styled_host(styled, Backend::kCpu),
+      device(field, Backend::kCuda), styled_device(styled, Backend::kCuda);
+  const RenderedPair a = host.RenderWith(styled_host, camera),
+                     b = device.RenderWith(styled_device, camera);
+  for (size_t i = 0; i < a.view.color.pixels.size(); ++i) {
+    ASSERT_NEAR(a.view.color.pixels[i], b.view.color.pixels[i], 1e-4) << i;
+    ASSERT_NEAR(a.other_color.pixels[i], b.other_color.pixels[i], 1e-4) << i;
+  }
+  for (size_t i = 0; i < a.view.depth.pixels.size(); ++i)
+    ASSERT_NEAR(a.view.depth.pixels[i], b.view.depth.pixels[i], 1e-3) << i;
 }
 
 // Splats in larger arrays than they need, as a fit that adds some has them.
