@@ -214,7 +214,7 @@ void MeasureAll(RunContext* base, const TradeoffOptions& tradeoff, const std::st
   const Capture capture = ReadCapture(base->workspace->Path("poses"));
   DurationEstimate estimate(
       base->settings, store->all(),
-      [&capture](const RunSettings& settings) { return FittedPixels(settings, capture); });
+      [&capture](const RunSettings& settings) { return PlaceOf(settings, capture); });
   VariantRunner runner(base, folder + "/work");
   for (size_t i = 0; i < jobs.size(); ++i) {
     double left = 0;
@@ -324,7 +324,7 @@ void RunTradeoff(const Command& command, const Arguments& arguments, Console* co
   }
   CheckWords(command, words, 1, 1);
   CheckOptions(settings, tradeoff);
-  CheckTradeoff(settings);
+  CheckTogether(settings);
   base.source = AbsolutePath(words[0]);
   const CaptureSource source = base.Source();
   const bool style = !settings.style.pictures.empty();
@@ -346,7 +346,8 @@ void RunTradeoff(const Command& command, const Arguments& arguments, Console* co
   const std::vector<Variant> variants = VariantsOf(settings, choice);
   const int64_t photos = ExpectedPhotos(InputsOf(source), settings.ingest);
   const DurationEstimate estimate(settings, {}, [photos](const RunSettings& of) {
-    return ExpectedPixels(photos, of.scene.photo_size, of.run.holdout);
+    return FitPlace{.pixels = ExpectedPixels(photos, of.scene.photo_size, of.run.holdout),
+                    .photos = photos};
   });
   if (settings.start.dry_run) {
     double all = 0;

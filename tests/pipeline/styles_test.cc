@@ -46,10 +46,11 @@ void Synth(const TemporaryFolder& folder, const std::vector<std::string>& more =
 
 // A tiny run of folder / "s" with the given flags, its results in `out`.
 std::vector<std::string> RunOf(const TemporaryFolder& folder, const std::string& out,
-                               const std::vector<std::string>& more) {
+                               const std::vector<std::string>& more,
+                               const std::string& field = "splats") {
   std::vector<std::string> run{"run",        folder / "s/truth", "--out",
                                folder / out, "--device",         "cpu"};
-  for (const std::string& flag : testing::TinyFlags()) run.push_back(flag);
+  for (const std::string& flag : testing::TinyFlags(field)) run.push_back(flag);
   run.insert(run.end(), more.begin(), more.end());
   return run;
 }
@@ -363,7 +364,8 @@ TEST(StyledField, IsRemadeToTheBit) {
   const ProgramOutcome done =
       Regrade(RunOf(folder, "e",
                     {"--style", Asset("sunset"), "--keep-field", "--effects", "background=on",
-                     "--background-layers", "4", "--background-resolution", "16"}));
+                     "--background-layers", "4", "--background-resolution", "16"},
+                    "voxels"));
   ASSERT_EQ(done.code, 0) << done.text;
   const std::string style = folder / "e/styles/style_sunset";
   const StoredField source = ReadFieldFile(folder / "e/field.npz");
