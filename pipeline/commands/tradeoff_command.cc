@@ -18,7 +18,6 @@
 #include "pipeline/program/interrupt.h"
 #include "pipeline/report/cost_rows.h"
 #include "pipeline/report/html.h"
-#include "pipeline/run/plan.h"
 #include "pipeline/run/resolve_settings.h"
 #include "pipeline/run/run_file.h"
 #include "pipeline/run_pipeline.h"
@@ -345,10 +344,8 @@ void RunTradeoff(const Command& command, const Arguments& arguments, Console* co
   const std::string base_name = BaseName(settings, base.options, &choice.presets);
   const std::vector<Variant> variants = VariantsOf(settings, choice);
   const int64_t photos = ExpectedPhotos(InputsOf(source), settings.ingest);
-  const DurationEstimate estimate(settings, {}, [photos](const RunSettings& of) {
-    return FitPlace{.pixels = ExpectedPixels(photos, of.scene.photo_size, of.run.holdout),
-                    .photos = photos};
-  });
+  const DurationEstimate estimate(
+      settings, {}, [photos](const RunSettings& of) { return ExpectedPlace(of, photos); });
   if (settings.start.dry_run) {
     double all = 0;
     for (const Variant& variant : variants) {

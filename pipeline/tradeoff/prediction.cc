@@ -119,6 +119,13 @@ FitPlace PlaceOf(const RunSettings& settings, const Capture& capture) {
   return place;
 }
 
+FitPlace ExpectedPlace(const RunSettings& settings, int64_t photos) {
+  FitPlace place;
+  place.pixels = ExpectedPixels(photos, settings.scene.photo_size, settings.run.holdout);
+  place.photos = photos;
+  return place;
+}
+
 double AmountOf(const std::string& unit, const RunSettings& settings, const Capture& capture) {
   const double photos = static_cast<double>(capture.views.size());
   const double pixels = PhotoPixels(settings, capture);

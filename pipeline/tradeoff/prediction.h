@@ -25,6 +25,8 @@ struct StageTime {
 
 // Of a fit on the CPU: its photos and their pixels, at working size.
 FitPlace PlaceOf(const RunSettings& settings, const Capture& capture);
+// Before any photo is read, see ExpectedPixels.
+FitPlace ExpectedPlace(const RunSettings& settings, int64_t photos);
 
 // The amount of `unit` in a run with these settings:
 //   trials: of view dependence, 1 or 0, the same work for every capture |
