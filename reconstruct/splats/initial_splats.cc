@@ -7,6 +7,7 @@
 #include <boost/geometry/index/rtree.hpp>
 #include <cmath>
 #include <map>
+#include <optional>
 
 #include "kernels/base/error.h"
 #include "kernels/base/random.h"
@@ -25,15 +26,23 @@ struct Start {
 struct ColorSum {
   Vec3d sum;
   int count = 0;
+  bool empty = false;  // a pixel shows the known background through it
 
-  void Add(const SplatPhoto& photo, const Vec3f& place) {
+  void Add(const SplatPhoto& photo, const Vec3f& place,
+           const std::optional<Vec3f>& background = {}) {
     double u, v;
     const Camera& camera = photo.camera;
     if (!camera.Project(place.Cast<double>(), &u, &v)) return;
     if (!(u >= 0 && v >= 0 && u < camera.width && v < camera.height)) return;
     const size_t pixel = static_cast<size_t>(v) * camera.width + static_cast<size_t>(u);
     if (!photo.masked.empty() && photo.masked[pixel] != 0) return;
-    for (int c = 0; c < 3; ++c) sum[c] += photo.color[3 * pixel + c] / 65535.0;
+    bool clear = background.has_value();
+    for (int c = 0; c < 3; ++c) {
+      const double value = photo.color[3 * pixel + c] / 65535.0;
+      sum[c] += value;
+      clear = clear && std::abs(value - double{(*background)[c]}) < 0.5 / 255;
+    }
+    empty = empty || clear;
     ++count;
   }
   Vec3f Mean() const { return (sum / std::max(count, 1)).Cast<float>(); }
@@ -53,7 +62,8 @@ std::vector<Start> StartsAtPoints(const std::vector<TrainingView>& views,
   return starts;
 }
 
-// Adds random places of the box that two photos see, up to `count` starts.
+// Adds random places of the box that two photos see, up to `count` starts. With a known
+// background they lie in the photos' visual hull.
 void AddRandomStarts(const SplatPhotos& photos, const SceneBox& box, uint64_t seed,
                      size_t count, std::vector<Start>* starts) {
   constexpr uint64_t kTries = 20;
@@ -67,8 +77,9 @@ void AddRandomStarts(const SplatPhotos& photos, const SceneBox& box, uint64_t se
           box.radius[static_cast<int>(a)] *
               static_cast<float>(2 * RandomDouble(seed ^ kRandomSplatPlaces, a, i) - 1);
     ColorSum color;
-    for (int v = 0; v < photos.count(); ++v) color.Add(photos[v], place);
-    if (color.count >= least) starts->push_back({place, color.Mean()});
+    for (int v = 0; v < photos.count() && !color.empty; ++v)
+      color.Add(photos[v], place, box.background);
+    if (color.count >= least && !color.empty) starts->push_back({place, color.Mean()});
   }
 }
 
