@@ -12,7 +12,7 @@
 #include "pipeline/capture/working_views.h"
 #include "pipeline/commands/command.h"
 #include "pipeline/fields/field_file.h"
-#include "pipeline/fields/splat_ply.h"
+#include "pipeline/splat_files/splat_ply.h"
 #include "pipeline/fields/surface_points.h"
 #include "pipeline/fields/uniform_field.h"
 #include "pipeline/files/atomic_file.h"
