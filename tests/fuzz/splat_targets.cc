@@ -54,6 +54,13 @@ std::vector<std::string> DotSplatSeeds() {
   return {record, record + record};
 }
 
+// Mutants of mutants stay small.
+std::string Mutate(std::string file, FuzzRandom* random) {
+  file = MutateBytes(std::move(file), random);
+  file.resize(std::min<size_t>(file.size(), 8000));
+  return file;
+}
+
 // A header's mutation is a text's: the rows behind it keep their places.
 std::string MutatePly(std::string file, FuzzRandom* random) {
   static const std::vector<std::string> kWords = {"element vertex 2\n",
@@ -71,10 +78,11 @@ std::string MutatePly(std::string file, FuzzRandom* random) {
                                                   "list",
                                                   "\r"};
   const size_t end = file.find("end_header\n");
-  if (end == std::string::npos || random->Chance(0.5))
-    return MutateBytes(std::move(file), random);
+  if (end == std::string::npos || random->Chance(0.5)) return Mutate(std::move(file), random);
   const std::string rows = file.substr(end);
-  return MutateText(file.substr(0, end), kWords, random) + rows;
+  std::string head = MutateText(file.substr(0, end), kWords, random);
+  head.resize(std::min<size_t>(head.size(), 8000));
+  return head + rows;
 }
 
 void Check(const SplatScene& scene, size_t file_bytes) {
@@ -120,8 +128,8 @@ bool ReadPly(std::string_view bytes) {
 std::vector<FuzzTarget> SplatTargets() {
   return {{"splat_ply", PlySeeds, ReadPly, MutatePly, 6000},
           {"splat_compressed", CompressedSeeds, ReadAny, MutatePly, 6000},
-          {"splat_spz", SpzSeeds, ReadAny, MutateBytes, 10000},
-          {"splat_records", DotSplatSeeds, ReadAny, MutateBytes, 10000}};
+          {"splat_spz", SpzSeeds, ReadAny, Mutate, 10000},
+          {"splat_records", DotSplatSeeds, ReadAny, Mutate, 10000}};
 }
 
 }  // namespace regrade::testing

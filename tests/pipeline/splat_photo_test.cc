@@ -2,6 +2,9 @@
 // the reader are those of the photo.
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cmath>
+
 #include "kernels/image/resize.h"
 #include "kernels/splats/cpu/render_splats.h"
 #include "pipeline/images/image_file.h"
@@ -11,6 +14,35 @@
 
 namespace regrade {
 namespace {
+
+// What a pinhole camera would have seen, from a photo of fox at a quarter of its size; by the
+// lens in its transforms.json.
+Image WithoutLens(const Image& photo, const Camera& pinhole) {
+  Camera lens;
+  lens.width = photo.width, lens.height = photo.height;
+  lens.fx = 1375.52 / 4, lens.fy = 1374.49 / 4, lens.cx = 554.558 / 4, lens.cy = 965.268 / 4;
+  lens.lens = LensModel::kOpenCv;
+  lens.distortion = {0.0578421, -0.0805099, -0.000980296, 0.00015575};
+  Image seen(pinhole.width, pinhole.height);
+  for (int y = 0; y < seen.height; ++y)
+    for (int x = 0; x < seen.width; ++x) {
+      double u = 0, v = 0;
+      EXPECT_TRUE(lens.Project(
+          {(x + 0.5 - pinhole.cx) / pinhole.fx, (y + 0.5 - pinhole.cy) / pinhole.fy, 1}, &u,
+          &v));
+      u = std::clamp(u - 0.5, 0.0, photo.width - 1.001);
+      v = std::clamp(v - 0.5, 0.0, photo.height - 1.001);
+      const int left = static_cast<int>(u), top = static_cast<int>(v);
+      for (int c = 0; c < 3; ++c) {
+        const auto mix = [&](int row) {
+          return std::lerp(double{photo.at(left, row)[c]}, double{photo.at(left + 1, row)[c]},
+                           u - left);
+        };
+        seen.at(x, y)[c] = static_cast<float>(std::lerp(mix(top), mix(top + 1), v - top));
+      }
+    }
+  return seen;
+}
 
 TEST(SplatFiles, RealSplatsShowTheirPhoto) {
   REGRADE_NEED_DATA("splats/fox_mcmc_60k.ply");
@@ -34,13 +66,12 @@ TEST(SplatFiles, RealSplatsShowTheirPhoto) {
       RenderSplats(MakeSplatFrame(scene.splats.view(), camera, options));
   Image seen(camera.width, camera.height);
   seen.pixels.assign(picture.color.begin(), picture.color.end());
-  const Image photo = Resize(DecodePhoto(testing::DataPath("fox/images/0001.jpg")).image,
-                             camera.width, camera.height);
+  const Image photo = WithoutLens(
+      Resize(DecodePhoto(testing::DataPath("fox/images/0001.jpg")).image, 270, 480), camera);
   const double psnr = testing::Psnr(seen, photo);
   RecordProperty("psnr", std::to_string(psnr));
-  // 30.2 dB over all held-out photos, without their lenses' distortion, is what the program
-  // that fitted them measured.
-  EXPECT_GT(psnr, 22);
+  // 26.8 dB; the program that fitted the splats measured 30.2 dB over all photos held out.
+  EXPECT_GT(psnr, 25);
 }
 
 }  // namespace
