@@ -79,6 +79,14 @@ TEST(HostileSplats, WhatHasALimitIsLimited) {
   }
 }
 
+// log(0) and log(1 / 0) are not.
+TEST(HostileSplats, BytesOfOpacityHaveFiniteLogits) {
+  EXPECT_NEAR(LogitOfByte(51), std::log(0.25), 1e-6);
+  EXPECT_NEAR(LogitOfByte(255), std::log(1019.0), 1e-5);
+  EXPECT_NEAR(LogitOfByte(0), -std::log(1019.0), 1e-5);
+  for (int byte = 1; byte < 256; ++byte) EXPECT_GT(LogitOfByte(byte), LogitOfByte(byte - 1));
+}
+
 // A double that no float has is infinite.
 TEST(HostileSplats, DoublesBeyondFloatsAreDropped) {
   std::string file = PlyOf(SomeSplats(), {.type = "double"});
