@@ -1,5 +1,5 @@
-// Compresses bytes in zlib's container (RFC 1950), which browsers read as "deflate", and unpacks
-// those of this container and of gzip's (RFC 1952).
+// Compresses bytes in zlib's container (RFC 1950), which browsers read as "deflate"; unpacks
+// this container and gzip's (RFC 1952).
 #pragma once
 
 #include <cstdint>

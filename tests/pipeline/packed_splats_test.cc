@@ -163,6 +163,17 @@ TEST(Spz, ExtensionsAreNamedAndOtherAxesRefused) {
                        ExitCode::kInput, "an extension goes beyond the end");
 }
 
+TEST(Spz, Version4HasItsExtensionsInFront) {
+  if (!HaveZstd()) GTEST_SKIP() << "built without libzstd";
+  const std::string other = LittleEndian(0xADBE0002u) + LittleEndian(0u);
+  SpzSplat splat = kByHand;
+  splat.sh.assign(9, 130);
+  const SplatScene scene = Read(testing::SpzOf4(1, {splat}, 2, other + testing::SpzAxes(6)));
+  EXPECT_EQ(scene.ignored, std::vector<std::string>{"extension 0xADBE0002"});
+  ExpectNear(scene.splats.mean, {1, -2, 1.0 / 4096});
+  EXPECT_EQ(scene.splats.sh[1], 2 / 128.0f);
+}
+
 TEST(Spz, Degree4LosesItsLastHarmonics) {
   SpzSplat splat = kByHand;
   splat.sh.assign(72, 130);
@@ -183,6 +194,11 @@ TEST(Spz, LyingHeadersAreRefused) {
   for (const uint32_t version : {0u, 1u, 5u, 0xffffff03u}) {
     file.replace(4, 4, LittleEndian(version));
     EXPECT_REGRADE_ERROR(Read(Gzip(file)), ExitCode::kInput, "2 to 4 are read");
+  }
+  for (const size_t place : {12, 13}) {  // the degree and the fractional bits
+    std::string odd = UnpackedSpz(3, 0, {kByHand});
+    odd[place] = 99;
+    EXPECT_REGRADE_ERROR(Read(odd), ExitCode::kInput, "99");
   }
   EXPECT_REGRADE_ERROR(Read("NGSP"), ExitCode::kInput, "no header");
   EXPECT_REGRADE_ERROR(Read(Gzip("a text")), ExitCode::kInput, "but not of splats");
