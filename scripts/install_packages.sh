@@ -12,6 +12,7 @@ packages=(
   libboost-dev                               # the local server (Beast), checksums
   libcurl4-openssl-dev libssl-dev            # fetching a network, SHA-256
   nlohmann-json3-dev libzip-dev libutfcpp-dev
+  libzstd-dev                                # splats in SPZ version 4
   libopenimageio-dev libjpeg62-turbo-dev libpng-dev libheif-dev liblcms2-dev   # pictures
   libopencv-dev                              # flow, networks of 2D methods
   libavformat-dev libavcodec-dev libavutil-dev libswscale-dev   # films, in and out

@@ -12,6 +12,7 @@ jobs=$(nproc)
 sanitized=(
   child_process_test kernels_bits_test kernels_color_test kernels_field_test kernels_network_test resize_test
   colmap_model_test pipeline_files_test pipeline_report_test readers_replay_test
+  splat_files_test
 )
 
 scripts/install_packages.sh --browser

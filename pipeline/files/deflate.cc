@@ -42,26 +42,12 @@ bool DeflatePart(std::string_view bytes, size_t i, std::string* packed) {
   return status == (last ? Z_STREAM_END : Z_OK) && stream.avail_in == 0;
 }
 
-}  // namespace
-
-std::string Deflate(std::string_view bytes) {
-  std::vector<std::string> parts(std::max<size_t>((bytes.size() + kPart - 1) / kPart, 1));
-  bool done = true;
-#pragma omp parallel for schedule(dynamic) reduction(&& : done)
-  for (size_t i = 0; i < parts.size(); ++i) done = done && DeflatePart(bytes, i, &parts[i]);
-  if (!done) throw ResourceError("bytes cannot be compressed: is there memory?");
-  std::string packed = kHeader;
-  for (const std::string& part : parts) packed += part;
-  const uLong sum = adler32_z(adler32_z(0, nullptr, 0),
-                              reinterpret_cast<const Bytef*>(bytes.data()), bytes.size());
-  for (int shift = 24; shift >= 0; shift -= 8)
-    packed.push_back(static_cast<char>(sum >> shift & 255));
-  return packed;
-}
-
-std::string Inflate(std::string_view packed, uint64_t max_bytes, const std::string& where) {
+// `window_bits` selects the container, see inflateInit2.
+std::string Unpack(std::string_view packed, int window_bits, uint64_t max_bytes,
+                   const std::string& where) {
   z_stream stream{};
-  if (inflateInit(&stream) != Z_OK) throw ResourceError("there is no memory to unpack", where);
+  if (inflateInit2(&stream, window_bits) != Z_OK)
+    throw ResourceError("there is no memory to unpack", where);
   stream.next_in = reinterpret_cast<Bytef*>(const_cast<char*>(packed.data()));
   size_t left = packed.size();
   std::string bytes;
@@ -81,6 +67,32 @@ std::string Inflate(std::string_view packed, uint64_t max_bytes, const std::stri
     throw InputError(Concat("unpacks to more than ", max_bytes, " bytes"), where);
   if (status != Z_STREAM_END || left > 0) throw InputError("compressed data is damaged", where);
   return bytes;
+}
+
+}  // namespace
+
+std::string Deflate(std::string_view bytes) {
+  std::vector<std::string> parts(std::max<size_t>((bytes.size() + kPart - 1) / kPart, 1));
+  bool done = true;
+#pragma omp parallel for schedule(dynamic) reduction(&& : done)
+  for (size_t i = 0; i < parts.size(); ++i) done = done && DeflatePart(bytes, i, &parts[i]);
+  if (!done) throw ResourceError("bytes cannot be compressed: is there memory?");
+  std::string packed = kHeader;
+  for (const std::string& part : parts) packed += part;
+  const uLong sum = adler32_z(adler32_z(0, nullptr, 0),
+                              reinterpret_cast<const Bytef*>(bytes.data()), bytes.size());
+  for (int shift = 24; shift >= 0; shift -= 8)
+    packed.push_back(static_cast<char>(sum >> shift & 255));
+  return packed;
+}
+
+std::string Inflate(std::string_view packed, uint64_t max_bytes, const std::string& where) {
+  return Unpack(packed, MAX_WBITS, max_bytes, where);
+}
+
+std::string Gunzip(std::string_view packed, uint64_t max_bytes, const std::string& where) {
+  constexpr int kGzip = 16;
+  return Unpack(packed, kGzip + MAX_WBITS, max_bytes, where);
 }
 
 }  // namespace regrade

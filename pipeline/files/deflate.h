@@ -1,4 +1,5 @@
-// Compresses bytes in zlib's container (RFC 1950), which browsers read as "deflate".
+// Compresses bytes in zlib's container (RFC 1950), which browsers read as "deflate"; unpacks
+// this container and gzip's (RFC 1952).
 #pragma once
 
 #include <cstdint>
@@ -13,5 +14,8 @@ std::string Deflate(std::string_view bytes);
 // Throws Error(kInput) with `where` for bytes that are damaged, followed by others, or larger
 // than `max_bytes` when unpacked.
 std::string Inflate(std::string_view packed, uint64_t max_bytes, const std::string& where);
+
+// The same for a gzip file of one member.
+std::string Gunzip(std::string_view packed, uint64_t max_bytes, const std::string& where);
 
 }  // namespace regrade

@@ -55,6 +55,7 @@ std::vector<FuzzTarget> PictureTargets();
 std::vector<FuzzTarget> PoseTableTargets();
 std::vector<FuzzTarget> RecordTargets();
 std::vector<FuzzTarget> RequestTargets();
+std::vector<FuzzTarget> SplatTargets();
 std::vector<FuzzTarget> StateTargets();
 
 template <typename... Lists>
@@ -68,7 +69,7 @@ std::vector<FuzzTarget> Joined(Lists... lists) {
 // Readers that link few libraries, and the others.
 inline std::vector<FuzzTarget> ReaderTargets() {
   return Joined(BundleTargets, ColmapTargets, CubeTargets, ArchiveTargets, FieldTargets,
-                JsonTargets, PoseTableTargets, PictureTargets);
+                JsonTargets, PoseTableTargets, PictureTargets, SplatTargets);
 }
 inline std::vector<FuzzTarget> ProgramTargets() {
   return Joined(RecordTargets, PageTargets, RequestTargets, FlowTargets, StateTargets,

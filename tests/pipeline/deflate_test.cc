@@ -42,6 +42,18 @@ TEST(Deflate, ThreadsDoNotChangeABit) {
   omp_set_num_threads(before);
 }
 
+TEST(Deflate, AGzipFileIsUnpacked) {
+  // What Python's gzip.compress makes of "splats".
+  constexpr unsigned char kPacked[] = {31, 139, 8,  0, 0, 0,   0,  0,  2,   3, 43, 46, 200,
+                                       73, 44,  41, 6, 0, 219, 75, 28, 127, 6, 0,  0,  0};
+  std::string packed(std::begin(kPacked), std::end(kPacked));
+  EXPECT_EQ(Gunzip(packed, 6, "test"), "splats");
+  EXPECT_REGRADE_ERROR(Gunzip(packed, 5, "test"), ExitCode::kInput, "more than 5");
+  EXPECT_REGRADE_ERROR(Inflate(packed, 6, "test"), ExitCode::kInput, "damaged");
+  packed[18] = 'x';  // of the checksum
+  EXPECT_REGRADE_ERROR(Gunzip(packed, 6, "test"), ExitCode::kInput, "damaged");
+}
+
 TEST(Deflate, DamageIsRefused) {
   std::string packed = Deflate(SomeBytes(100000));
   EXPECT_REGRADE_ERROR(Inflate(packed, 99999, "test"), ExitCode::kInput, "more than 99999");

@@ -1,4 +1,4 @@
-#include "pipeline/fields/splat_ply.h"
+#include "pipeline/splat_files/splat_ply.h"
 
 #include <array>
 #include <bit>
@@ -9,18 +9,11 @@
 #include "kernels/splats/rotate_harmonics.h"
 #include "kernels/splats/splat_field.h"
 #include "pipeline/files/atomic_file.h"
+#include "pipeline/splat_files/splat_record.h"
 #include "reconstruct/colmap/colmap_model.h"
 
 namespace regrade {
 namespace {
-
-// a b, both w x y z.
-std::array<double, 4> Product(const std::array<double, 4>& a, const std::array<double, 4>& b) {
-  return {a[0] * b[0] - a[1] * b[1] - a[2] * b[2] - a[3] * b[3],
-          a[0] * b[1] + a[1] * b[0] + a[2] * b[3] - a[3] * b[2],
-          a[0] * b[2] - a[1] * b[3] + a[2] * b[0] + a[3] * b[1],
-          a[0] * b[3] + a[1] * b[2] - a[2] * b[1] + a[3] * b[0]};
-}
 
 std::string Header(int64_t count, int basis, const std::string& comment) {
   std::string header = "ply\nformat binary_little_endian 1.0\ncomment " + comment +
@@ -70,8 +63,8 @@ void WriteSplatPly(const std::string& path, const StoredField& stored,
     row.push_back(splat.opacity_logit);
     for (int a = 0; a < 3; ++a)
       row.push_back(static_cast<float>(double{splat.log_scale[a]} - log_scale));
-    for (const double q : Product(turned, {splat.quaternion[0], splat.quaternion[1],
-                                           splat.quaternion[2], splat.quaternion[3]}))
+    for (const double q : QuaternionProduct(turned, {splat.quaternion[0], splat.quaternion[1],
+                                                     splat.quaternion[2], splat.quaternion[3]}))
       row.push_back(static_cast<float>(q));
     bytes.append(reinterpret_cast<const char*>(row.data()), row.size() * sizeof(float));
   }

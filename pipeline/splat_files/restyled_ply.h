@@ -1,0 +1,23 @@
+// A PLY of Gaussians with other colours, in its own layout.
+#pragma once
+
+#include <filesystem>
+#include <span>
+#include <string>
+
+namespace regrade {
+
+// Copies `path_in`, a PLY of Gaussians that ReadSplats has read, to `path_out` (atomically, it
+// may be the same) with other numbers in f_dc_* and f_rest_*, and one more comment, a line of
+// the header. All other bytes and the order of the vertices stay.
+//
+// `sh` [N, 3, basis]: of the N splats of ReadSplats, in their order and frame, all coefficients
+// of red first. `basis` is at most that of the file, 1, 4, 9 or 16; coefficients of higher
+// degrees become 0. The splats that ReadSplats dropped keep their bytes.
+//
+// Throws Error(kUsage) for another format or colours of an integer type, Error(kInput) as
+// ReadSplats and if the file no longer has N such splats, Error(kResources) as AtomicFile.
+void WriteRestyled(const std::filesystem::path& path_in, const std::filesystem::path& path_out,
+                   std::span<const float> sh, int basis, const std::string& comment);
+
+}  // namespace regrade
