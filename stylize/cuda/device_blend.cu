@@ -107,10 +107,9 @@ __global__ void AddBackgroundKernel(Vec3f background, const float* transmittance
 
 template <bool kExact>
 __global__ void BlendColorsKernel(StyleFieldView field, const DeviceWeightedSample* samples,
-                                  int64_t n,
-                                  const int32_t* counted, const int32_t* slot_of_point,
-                                  const Ray* rays, const float* rows, float* color,
-                                  uint8_t* unclamped) {
+                                  int64_t n, const int32_t* counted,
+                                  const int32_t* slot_of_point, const Ray* rays,
+                                  const float* rows, float* color, uint8_t* unclamped) {
   const int64_t i = ItemOfWarp(n, counted);
   if (i < 0) return;
   const WarpSample warp(field, samples[i], slot_of_point, rays);
@@ -186,8 +185,8 @@ void BlendColors(const DeviceStyleField& field, const DeviceRayWeights& weights,
   if (weights.num_samples > 0) {
     const auto kernel = exact != nullptr ? BlendColorsKernel<true> : BlendColorsKernel<false>;
     kernel<<<BlocksFor(32 * weights.num_samples), kThreads, 0, LaunchStream()>>>(
-        field.view(), weights.samples.data(), weights.num_samples,
-        weights.counter.data(), slots.slot_of_point.data(), rays, rows, sums, unclamped);
+        field.view(), weights.samples.data(), weights.num_samples, weights.counter.data(),
+        slots.slot_of_point.data(), rays, rows, sums, unclamped);
     CheckLaunch("blend_colors");
   }
   if (exact != nullptr) TakeExact(exact, values, nullptr, &color->x);
@@ -203,8 +202,8 @@ void BlendColorsAdjoint(const DeviceStyleField& field, const DeviceRayWeights& w
     const auto kernel =
         exact != nullptr ? BlendColorsAdjointKernel<true> : BlendColorsAdjointKernel<false>;
     kernel<<<BlocksFor(32 * weights.num_samples), kThreads, 0, LaunchStream()>>>(
-        field.view(), weights.samples.data(), weights.num_samples,
-        weights.counter.data(), slots.slot_of_point.data(), rays, unclamped, d_color,
+        field.view(), weights.samples.data(), weights.num_samples, weights.counter.data(),
+        slots.slot_of_point.data(), rays, unclamped, d_color,
         exact != nullptr ? exact : d_rows);
     CheckLaunch("blend_colors_adjoint");
   }
@@ -230,16 +229,16 @@ void BlendRows(const DeviceStyleField& field, const DeviceRayWeights& weights,
 
 #else
 
-void BlendColors(const DeviceStyleField&, const DeviceRayWeights&, const DeviceSlots&, const Ray*,
-                 const float*, Vec3f*, uint8_t*, float*) {
+void BlendColors(const DeviceStyleField&, const DeviceRayWeights&, const DeviceSlots&,
+                 const Ray*, const float*, Vec3f*, uint8_t*, float*) {
   DeviceWait("blend_colors");
 }
 void BlendColorsAdjoint(const DeviceStyleField&, const DeviceRayWeights&, const DeviceSlots&,
                         const Ray*, const uint8_t*, const Vec3f*, float*, float*) {
   DeviceWait("blend_colors_adjoint");
 }
-void BlendRows(const DeviceStyleField&, const DeviceRayWeights&, const DeviceSlots&, const float*,
-               float*, float*) {
+void BlendRows(const DeviceStyleField&, const DeviceRayWeights&, const DeviceSlots&,
+               const float*, float*, float*) {
   DeviceWait("blend_rows");
 }
 

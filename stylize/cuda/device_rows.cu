@@ -151,8 +151,8 @@ void AddViewPenalty(const Mat3f& matrix, const float* from, const float* rows, i
 
 void ScatterRows(const float* rows, int64_t first, int64_t n, DeviceStyleField* field) {
   if (n == 0) return;
-  ScatterRowsKernel<<<BlocksFor(32 * n), kThreads, 0, LaunchStream()>>>(
-      rows, first, n, field->view());
+  ScatterRowsKernel<<<BlocksFor(32 * n), kThreads, 0, LaunchStream()>>>(rows, first, n,
+                                                                        field->view());
   CheckLaunch("scatter_rows");
 }
 
@@ -169,7 +169,9 @@ void AddViewPenalty(const Mat3f&, const float*, const float*, int64_t, float, fl
                     const int32_t*) {
   DeviceWait("add_view_penalty");
 }
-void ScatterRows(const float*, int64_t, int64_t, DeviceStyleField*) { DeviceWait("scatter_rows"); }
+void ScatterRows(const float*, int64_t, int64_t, DeviceStyleField*) {
+  DeviceWait("scatter_rows");
+}
 
 #endif
 

@@ -75,8 +75,9 @@ class DeviceStyleLoss : public StyleLoss {
     result.rays = static_cast<int64_t>(sums.rays);
     result.squared_error = sums.squared_error;
     if (result.rays == 0) return result;
-    const double count = options_.divide_by_voxels ? static_cast<double>(field_.grid.num_voxels())
-                                                   : 3.0 * static_cast<double>(result.rays);
+    const double count = options_.divide_by_voxels
+                             ? static_cast<double>(field_.grid.num_voxels())
+                             : 3.0 * static_cast<double>(result.rays);
     result.loss = sums.loss / count;
     if (gradient == nullptr) return result;
     mlp_->AddAdjoint(precision, features_.data(), d_rows_.data(), slots_.num_slots);
@@ -233,8 +234,7 @@ void RestyleOnDevice(const LipschitzNetwork& network, DeviceStyleField* field) {
   REGRADE_CHECK(!grid.fitting);
   const DeviceRange range("restyling the field");
   constexpr int64_t kChunk = 1 << 20;  // points; 256 MiB of features and results
-  const int64_t room =
-      std::min(std::max(grid.num_voxels(), grid.spheres.num_texels()), kChunk);
+  const int64_t room = std::min(std::max(grid.num_voxels(), grid.spheres.num_texels()), kChunk);
   DeviceBuffer<float> features(room * kRowLanes, "features of voxels");
   DeviceBuffer<float> rows(room * kRowLanes, "styled voxels");
   const DeviceMlp mlp(MakeFusedMlp(network.Effective<float>()));

@@ -28,7 +28,8 @@ class CudaStyleEngine : public StyleEngine {
     if (field_.splats != nullptr)
       weigher_ = std::make_unique<DeviceRayWeigher>(field_.splats.get(), loss.min_weight);
     else
-      weigher_ = MakeRayWeigher(*field->geometry, field->near_clip, loss.march, loss.min_weight);
+      weigher_ =
+          MakeRayWeigher(*field->geometry, field->near_clip, loss.march, loss.min_weight);
   }
 
   StyleLoss* loss() override { return loss_.get(); }

@@ -113,8 +113,8 @@ void DeviceSplatWeigher::WeighViews(const std::vector<bool>& used, const PlaceGr
   weigh(lists_, -1);
 }
 
-void DeviceSplatWeigher::Weigh(const std::vector<Group>& groups, int64_t rays,
-                               float min_weight, DeviceSplatSamples* samples) {
+void DeviceSplatWeigher::Weigh(const std::vector<Group>& groups, int64_t rays, float min_weight,
+                               DeviceSplatSamples* samples) {
   const DeviceRange range("weights of splats");
   const int64_t n = std::ssize(groups);
   const std::vector<ViewPlace> places = PlacesOf(groups, rays);

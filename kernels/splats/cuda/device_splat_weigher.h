@@ -64,9 +64,9 @@ class DeviceSplatWeigher {
   DeviceSplats splats_;
   SplatOptions options_;
   int64_t left_bytes_;
-  std::vector<View> views_;           // of all cameras so far
-  std::vector<CameraLists> lists_;    // [views]; of those that are kept
-  DeviceBuffer<CameraLists> table_;   // [views]
+  std::vector<View> views_;          // of all cameras so far
+  std::vector<CameraLists> lists_;   // [views]; of those that are kept
+  DeviceBuffer<CameraLists> table_;  // [views]
   DeviceBuffer<ViewPlace> places_;
   DeviceBuffer<SplatRecord> record_;
   DeviceBuffer<int32_t> num_tiles_, index_, passing_;

@@ -49,8 +49,8 @@ __global__ void __launch_bounds__(kBlock)
   ViewPlace place{-1, 0, 0};
   if (ray < places.rays) place = places.place[group * places.rays + ray];
   const CameraLists* const own = lists + max(place.camera, 0);
-  const bool chosen = place.camera >= 0 && own->first != nullptr &&
-                      (only < 0 || place.camera == only);
+  const bool chosen =
+      place.camera >= 0 && own->first != nullptr && (only < 0 || place.camera == only);
   int at = 0, end = 0;
   if (chosen) {
     const int tile = static_cast<int>(place.v) / kDeviceTile * own->columns +
