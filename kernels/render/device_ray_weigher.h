@@ -12,6 +12,7 @@ class DeviceRayWeigher : public RayWeigher {
   DeviceRayWeigher(DeviceSplatWeigher* weigher, float min_weight)
       : weigher_(*weigher), min_weight_(min_weight) {}
 
+  using RayWeigher::Weigh;
   RayWeights Weigh(const ViewRays& rays, int64_t begin, int64_t end) override;
 
  private:

@@ -143,16 +143,18 @@ void StylePacked(const StylePackedOptions& settings, const TrainNetworkOptions& 
   watch.Lap();
 
   int64_t free_before = 0, least_free = 0;  // bytes on the device, beside the field
+  Stopwatch steps;
+  double seconds_start = 0, seconds_steps = 0;
+  int reports = 0;
   RestyleHooks hooks;
   hooks.finished = [&](RestyleHooks::Part part) {
     const char* const names[] = {"seconds_upload", "seconds_learn", "seconds_restyle"};
     record[names[static_cast<int>(part)]] = watch.Lap();
+    const double since_last_step = steps.Lap();
+    if (part == RestyleHooks::Part::kTraining) record["seconds_conclusion"] = since_last_step;
     if (on_device && part == RestyleHooks::Part::kUpload)
       free_before = least_free = ReadDeviceStatus().free_bytes;
   };
-  Stopwatch steps;
-  double seconds_start = 0, seconds_steps = 0;
-  int reports = 0;
   hooks.training.progress = [&](const Progress&) {
     (reports++ == 0 ? seconds_start : seconds_steps) += steps.Lap();
     if (on_device && reports % 4 == 1)

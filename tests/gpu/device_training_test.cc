@@ -174,7 +174,7 @@ TEST_F(DeviceStyleTraining, SplatsAreRestyledAsOnTheCpu) {
   }
   ParityRow("map of splats", "800 splats", "CPU, relative", std::abs(of_map[1] / of_map[0] - 1),
             2e-5);
-  ASSERT_LT(loss[0], of_map[0] / 2);
+  ASSERT_LT(loss[0], 0.8 * of_map[0]);
   ParityRow("training of splats, loss", "50 steps", "CPU, of what was gained",
             std::abs(loss[1] - loss[0]) / (of_map[0] - loss[0]), kOff);
   const Buffer<float>&is = restyled[1].styled.appearance.sh,
