@@ -5,6 +5,11 @@
 // Kheradmand et al. 2024, eq. 10:  lambda_o mean sigmoid(x_i) + lambda_s mean exp(l_ik)  over
 // all splats.
 //
+// EQ(splat-color-bound): after the step, a coefficient of degree 0 is projected into
+// [-mean_bound, mean_bound], by default a mean colour in [0, 1], and every other one into
+// [-view_bound, view_bound]. What a colour's clamp or the splats before it hide, a style's map
+// of colours would reveal.
+//
 // EQ(splat-noise), Kheradmand et al. 2024, eq. 8: after the step, with the covariance Sigma of
 // EQ(splat-covariance) and n ~ N(0, 1)^3,
 //   mean += noise Sigma n / (1 + exp(100 (o - 0.005))),
@@ -35,9 +40,10 @@ struct SplatRates {
 
 struct SplatUpdate {
   SplatRates rates;
-  float opacity_weight = 0, scale_weight = 0;  // the lambdas over the numbers of values
-  float noise = 0;                             // of EQ(splat-noise)
-  uint64_t seed = 0, step = 0;                 // steps before this one
+  float opacity_weight = 0, scale_weight = 0;         // the lambdas over the numbers of values
+  float noise = 0;                                    // of EQ(splat-noise)
+  float mean_bound = 1.77245385f, view_bound = 0.2f;  // sqrt(pi) = 1 / (2 kSh0)
+  uint64_t seed = 0, step = 0;                        // steps before this one
   // Of Adam, for this step: see AdamUpdate.
   float beta1 = 0.9f, beta2 = 0.999f, epsilon = 1e-15f;
   float inverse_correction1 = 1, inverse_correction2 = 1;
@@ -45,6 +51,10 @@ struct SplatUpdate {
   HD void Step(float gradient, float rate, float* value, float* first, float* second) const {
     AdamUpdate(gradient, beta1, beta2, epsilon, rate * inverse_correction1, inverse_correction2,
                value, first, second);
+  }
+
+  HD static void Bound(float bound, float* value) {
+    *value = *value > bound ? bound : *value < -bound ? -bound : *value;
   }
 
   void SetStep(uint64_t number) {
@@ -138,6 +148,7 @@ HD inline bool UpdateColor(const SplatUpdate& update, bool of_mean, float d, int
   if (!(abs(d) < kLargestGradient)) return false;
   update.Step(d, of_mean ? update.rates.sh_mean : update.rates.sh_rest, to.value.sh + k,
               to.first.sh + k, to.second.sh + k);
+  SplatUpdate::Bound(of_mean ? update.mean_bound : update.view_bound, to.value.sh + k);
   return true;
 }
 
@@ -152,8 +163,10 @@ inline bool UpdateColors(const SplatUpdate& update, int64_t i, int basis, const 
     UpdateColor(update, true, d_sh[c * basis], row, to);
     float *value = to.value.sh + row, *first = to.first.sh + row, *second = to.second.sh + row;
 #pragma omp simd
-    for (int b = 1; b < basis; ++b)
+    for (int b = 1; b < basis; ++b) {
       update.Step(d_sh[c * basis + b], update.rates.sh_rest, value + b, first + b, second + b);
+      SplatUpdate::Bound(update.view_bound, value + b);
+    }
   }
   return true;
 }

@@ -18,7 +18,6 @@
 #include "pipeline/program/interrupt.h"
 #include "pipeline/report/cost_rows.h"
 #include "pipeline/report/html.h"
-#include "pipeline/run/plan.h"
 #include "pipeline/run/resolve_settings.h"
 #include "pipeline/run/run_file.h"
 #include "pipeline/run_pipeline.h"
@@ -214,7 +213,7 @@ void MeasureAll(RunContext* base, const TradeoffOptions& tradeoff, const std::st
   const Capture capture = ReadCapture(base->workspace->Path("poses"));
   DurationEstimate estimate(
       base->settings, store->all(),
-      [&capture](const RunSettings& settings) { return FittedPixels(settings, capture); });
+      [&capture](const RunSettings& settings) { return PlaceOf(settings, capture); });
   VariantRunner runner(base, folder + "/work");
   for (size_t i = 0; i < jobs.size(); ++i) {
     double left = 0;
@@ -324,7 +323,7 @@ void RunTradeoff(const Command& command, const Arguments& arguments, Console* co
   }
   CheckWords(command, words, 1, 1);
   CheckOptions(settings, tradeoff);
-  CheckTradeoff(settings);
+  CheckTogether(settings);
   base.source = AbsolutePath(words[0]);
   const CaptureSource source = base.Source();
   const bool style = !settings.style.pictures.empty();
@@ -345,9 +344,8 @@ void RunTradeoff(const Command& command, const Arguments& arguments, Console* co
   const std::string base_name = BaseName(settings, base.options, &choice.presets);
   const std::vector<Variant> variants = VariantsOf(settings, choice);
   const int64_t photos = ExpectedPhotos(InputsOf(source), settings.ingest);
-  const DurationEstimate estimate(settings, {}, [photos](const RunSettings& of) {
-    return ExpectedPixels(photos, of.scene.photo_size, of.run.holdout);
-  });
+  const DurationEstimate estimate(
+      settings, {}, [photos](const RunSettings& of) { return ExpectedPlace(of, photos); });
   if (settings.start.dry_run) {
     double all = 0;
     for (const Variant& variant : variants) {

@@ -44,8 +44,13 @@ std::vector<std::string> EquivalentCommand(const RunContext& context) {
   if (!context.source.empty()) words.push_back(context.source);
   if (preset != RunSettings().run.preset) words.insert(words.end(), {"--preset", preset});
   const JsonValue values = context.options.Values();
+  // The flags of another kind of field are refused.
+  const JsonValue unused = context.settings.scene.UsesSplats()
+                               ? OptionValues(context.settings.fit)
+                               : OptionValues(context.settings.splats);
   for (const auto& [name, value] : values.AsObject()) {
-    if (name == "preset" || start.Find(name) != nullptr || program.Find(name) != nullptr)
+    if (name == "preset" || start.Find(name) != nullptr || program.Find(name) != nullptr ||
+        unused.Find(name) != nullptr)
       continue;
     if (!(before.At(name) == value)) AddFlag(name, value, &words);
   }

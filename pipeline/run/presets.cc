@@ -39,7 +39,7 @@ struct SplatEffort {
 };
 
 const SplatEffort kSplatEfforts[] = {
-    {"smoke", false, 150, 5},      {"draft", false, 1300, 40},  {"standard", false, 2500, 100},
+    {"smoke", false, 150, 5},      {"draft", false, 1300, 40},  {"standard", false, 1400, 60},
     {"best", false, 4000, 250},    {"smoke", true, 300, 10},    {"draft", true, 4000, 200},
     {"standard", true, 7500, 500}, {"best", true, 10000, 1000},
 };
@@ -71,6 +71,7 @@ void ApplyPreset(const std::string& preset, bool on_card, RunSettings* settings)
     throw UsageError("'" + preset + "' is not allowed", "--preset",
                      "give one of smoke, draft, standard, paper, best");
   settings->run.preset = preset;
+  settings->scene.field = preset == "paper" ? "voxels" : "splats";
   ApplyStyleRecipe(preset == "paper" ? "paper" : "standard", &settings->network);
   UseFitEffort(preset, on_card, &settings->fit);
   UseSplatEffort(preset, on_card, &settings->splats);

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <filesystem>
 
+#include "kernels/base/error.h"
 #include "pipeline/program/device_choice.h"
 #include "pipeline/run/paper_config.h"
 #include "pipeline/run/presets.h"
@@ -77,6 +78,21 @@ void ApplyField(const std::string& field, OptionSet* options) {
     ApplyKnown(FieldValues(field), "--fit-field", options);
 }
 
+// Refuses flags of a kind of field that the run does not fit.
+void RefuseFlagsOfOtherField(const OptionSet& options) {
+  const JsonValue values = options.Values();
+  const JsonValue* const field = values.Find("field");
+  if (field == nullptr || values.Find("photo-size") == nullptr) return;
+  const bool splats = field->AsString() == "splats";
+  const JsonValue others =
+      splats ? OptionValues(FitOptions()) : OptionValues(SplatFitOptions());
+  for (const auto& [name, value] : others.AsObject())
+    if (options.Given(name))
+      throw UsageError(
+          "this run fits " + field->AsString(), "--" + name,
+          std::string("leave it out, or add --field ") + (splats ? "voxels" : "splats"));
+}
+
 // What the flags say, or else the defaults; false for a command without --device.
 bool OnCard(const OptionSet& options) {
   const JsonValue values = options.Values();
@@ -147,6 +163,9 @@ std::vector<std::string> ResolveSettings(const SettingsSources& sources, OptionS
   if (!sources.run_json.empty()) {
     RunFile file = ReadRunFile(sources.run_json);
     file.options = OfFolder(file, sources, given.options, *options);
+    // Before there was a choice, runs had voxels.
+    if (file.options.IsObject() && file.options.Find("field") == nullptr)
+      file.options["field"] = "voxels";
     ApplyRunFile(file, sources.run_json, sources.taken, on_card, options);
     words = file.words;
   }
@@ -169,6 +188,7 @@ std::vector<std::string> ResolveSettings(const SettingsSources& sources, OptionS
   if (options->Given("fit-resolutions"))
     ApplyKnown(JsonValue::Object{{"fit-fewer-stages", false}}, "--fit-resolutions", options);
   options->ApplyFlags();
+  RefuseFlagsOfOtherField(*options);
   const JsonValue values = options->Values();
   const JsonValue *reproducible = values.Find("reproducible"), *device = values.Find("device");
   if (reproducible != nullptr && reproducible->AsBool() && device != nullptr &&

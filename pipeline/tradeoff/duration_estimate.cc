@@ -8,7 +8,6 @@
 #include "pipeline/fields/film_timing.h"
 #include "pipeline/run/plan.h"
 #include "pipeline/stages/film_frames.h"
-#include "reconstruct/fit/adapt_options.h"
 
 namespace regrade {
 namespace {
@@ -22,8 +21,8 @@ std::string KeyOf(const std::string& benchmark, const std::string& parameter,
 
 DurationEstimate::DurationEstimate(const RunSettings& base,
                                    const std::vector<Measurement>& measured,
-                                   FittedPixelsFunction pixels_of)
-    : base_(base), pixels_of_(std::move(pixels_of)) {
+                                   FitPlaceFunction place_of)
+    : base_(base), place_of_(std::move(place_of)) {
   for (const Measurement& m : measured) Add(m);
 }
 
@@ -72,13 +71,9 @@ double DurationEstimate::Rough(const Variant& variant) const {
   settings.Bind(&options);
   if (variant.benchmark == "fit" || variant.benchmark == "style")
     options.ApplyConfig(variant.options, "tradeoff");
-  const int threads = omp_get_max_threads();
-  if (variant.benchmark == "fit") {
-    const int64_t pixels = pixels_of_(settings);
-    return PlanFit(AdaptOptions(settings.fit, {.pixels = pixels}), pixels, SceneBox(), threads)
-        .seconds;
-  }
-  if (variant.benchmark == "style") return PlanStyle(settings.network.steps, threads).seconds;
+  if (variant.benchmark == "fit") return PlanFieldFit(settings, place_of_(settings)).seconds;
+  if (variant.benchmark == "style")
+    return PlanStyle(settings.network.steps, omp_get_max_threads()).seconds;
   return variant.benchmark == "poses" ? kPoses : kFewSeconds;
 }
 

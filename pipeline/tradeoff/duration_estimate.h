@@ -7,17 +7,17 @@
 #include <string>
 #include <vector>
 
+#include "pipeline/run/fit_memory.h"
 #include "pipeline/tradeoff/measurements.h"
 
 namespace regrade {
 
 class DurationEstimate {
  public:
-  // `pixels_of`: of the photos that a fit with these settings has, at working size; small ones
-  // have fewer stages.
-  using FittedPixelsFunction = std::function<int64_t(const RunSettings&)>;
+  // Of a fit with these settings: its photos and their pixels; small ones have less work.
+  using FitPlaceFunction = std::function<FitPlace(const RunSettings&)>;
   DurationEstimate(const RunSettings& base, const std::vector<Measurement>& measured,
-                   FittedPixelsFunction pixels_of);
+                   FitPlaceFunction place_of);
 
   void Add(const Measurement& measurement);
   double Seconds(const Variant& variant) const;
@@ -33,7 +33,7 @@ class DurationEstimate {
   double Rough(const Variant& variant) const;
 
   RunSettings base_;
-  FittedPixelsFunction pixels_of_;
+  FitPlaceFunction place_of_;
   std::map<std::string, Sum> benchmarks_;  // measured and estimated seconds of the base
   std::map<std::string, double> last_;     // last measured seconds of each variant
 };

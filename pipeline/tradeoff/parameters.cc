@@ -74,7 +74,17 @@ class VariantList {
   std::vector<std::string> names_;
 };
 
-void AddFitParameters(const RunSettings& base, VariantList* list) {
+void AddSplatParameters(const SplatFitOptions& splats, VariantList* list) {
+  const auto steps = [&](double factor) {
+    return JsonValue(std::max(1, static_cast<int>(std::lround(splats.steps * factor))));
+  };
+  const auto most = [&](float factor) { return factor * splats.thousands; };
+  list->Add("fit", "splat-steps", splats.steps, {steps(0.25), steps(0.5), steps(1), steps(2)});
+  list->Add("fit", "splats", splats.thousands, {most(0.25f), most(0.5f), most(1), most(2)});
+  list->Add("fit", "splat-degree", splats.sh_degree, {0, 1, 2});
+}
+
+void AddVoxelParameters(const RunSettings& base, VariantList* list) {
   const FitOptions& fit = base.fit;
   const auto steps = [&](double factor) { return Numbers(Scaled(fit.steps, factor, 1)); };
   const auto grids = [&](double factor) {
@@ -115,7 +125,7 @@ const Benchmark& BenchmarkOf(const std::string& name) {
 JsonValue PresetOptions(const std::string& preset) {
   RunSettings settings;
   ApplyPreset(preset, /*on_card=*/false, &settings);
-  return OptionValues(settings.scene, settings.fit);
+  return OptionsOfFit(settings);
 }
 
 std::vector<Variant> VariantsOf(const RunSettings& base, const ParameterChoice& choice) {
@@ -126,15 +136,20 @@ std::vector<Variant> VariantsOf(const RunSettings& base, const ParameterChoice& 
     list.Add("poses", "pose-image-size", size, {size * 6 / 10, size, size * 16 / 10});
   }
   list.AddBase("fit");
-  AddFitParameters(base, &list);
+  if (base.scene.UsesSplats())
+    AddSplatParameters(base.splats, &list);
+  else
+    AddVoxelParameters(base, &list);
   if (choice.style) {
     list.AddBase("style");
     AddStyleParameters(base, &list);
   }
-  list.AddBase("render");
-  // Ray marching, which has no options in a run: films use the field's step and 1e-4.
-  list.Add("render", "ray-stop", nullptr, {1e-2, 1e-3, 0.0});
-  list.Add("render", "ray-step", nullptr, {2.0, 0.5});
+  if (!base.scene.UsesSplats()) {
+    list.AddBase("render");
+    // Ray marching, which has no options in a run: films use the field's step and 1e-4.
+    list.Add("render", "ray-stop", nullptr, {1e-2, 1e-3, 0.0});
+    list.Add("render", "ray-step", nullptr, {2.0, 0.5});
+  }
   list.AddBase("flow");
   list.Add("flow", "flow", base.consistency.flow,
            {"dis-ultrafast", "dis-fast", "dis-medium", "farneback", "dis-tuned"});
@@ -149,13 +164,6 @@ std::vector<Variant> VariantsOf(const RunSettings& base, const ParameterChoice& 
            });
   });
   return variants;
-}
-
-void CheckTradeoff(const RunSettings& settings) {
-  CheckTogether(settings);
-  if (settings.scene.UsesSplats())
-    throw UsageError("it varies fits of voxels", "--field splats",
-                     "leave it out, or time `regrade run` with other --splat-steps");
 }
 
 }  // namespace regrade

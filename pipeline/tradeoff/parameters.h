@@ -42,13 +42,9 @@ struct ParameterChoice {
   std::vector<std::string> presets;
 };
 
-// Throws Error(kUsage) for settings that contradict each other, and for a field of splats,
-// whose fits have no variants.
-void CheckTradeoff(const RunSettings& settings);
-
 // The base of each benchmark, then each parameter's values from cheap to accurate. Values are
-// relative to the base's: half and twice its steps, a coarser and a finer grid. Throws
-// Error(kUsage) for an unknown name in `only`.
+// relative to the base's: half and twice its steps or splats, a coarser and a finer grid.
+// Throws Error(kUsage) for an unknown name in `only`.
 std::vector<Variant> VariantsOf(const RunSettings& base, const ParameterChoice& choice);
 
 // A preset's values of the options in the groups Scene and Fit.

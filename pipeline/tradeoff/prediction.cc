@@ -23,16 +23,19 @@ struct StageUnits {
   std::vector<const char*> parameters;
 };
 
-const std::vector<StageUnits>& AllUnits() {
-  static const std::vector<StageUnits> all = {
+constexpr char kVoxelWork[] = "ray voxels", kSplatWork[] = "planned seconds";
+
+std::vector<StageUnits> UnitsOf(const RunSettings& settings) {
+  return {
       {"pose", {"photo megapixels"}, "", {}},
-      {"reconstruct", {"ray voxels"}, "fit", {"fit-steps", "fit-resolutions"}},
+      settings.scene.UsesSplats()
+          ? StageUnits{"reconstruct", {kSplatWork}, "fit", {"splat-steps", "splats"}}
+          : StageUnits{"reconstruct", {kVoxelWork}, "fit", {"fit-steps", "fit-resolutions"}},
       {"style_2d", {"staged pixels"}, "", {}},
       {"stylize", {"style rays", "photo pixels"}, "style", {"style-steps"}},
       {"render", {"frame pixels"}, "", {}},
       {"evaluate", {"pair pixels"}, "", {}},
   };
-  return all;
 }
 
 int64_t PixelsOf(const CaptureView& view, const RunSettings& settings) {
@@ -108,12 +111,19 @@ double FilmPixels(const RunSettings& settings, const Capture& capture, const Cam
 
 }  // namespace
 
-int64_t FittedPixels(const RunSettings& settings, const Capture& capture) {
+FitPlace PlaceOf(const RunSettings& settings, const Capture& capture) {
   const std::vector<bool> held_out = HeldOutViews(capture, settings.run.holdout);
-  int64_t pixels = 0;
+  FitPlace place;
   for (size_t i = 0; i < capture.views.size(); ++i)
-    if (!held_out[i]) pixels += PixelsOf(capture.views[i], settings);
-  return pixels;
+    if (!held_out[i]) place.pixels += PixelsOf(capture.views[i], settings), ++place.photos;
+  return place;
+}
+
+FitPlace ExpectedPlace(const RunSettings& settings, int64_t photos) {
+  FitPlace place;
+  place.pixels = ExpectedPixels(photos, settings.scene.photo_size, settings.run.holdout);
+  place.photos = photos;
+  return place;
 }
 
 double AmountOf(const std::string& unit, const RunSettings& settings, const Capture& capture) {
@@ -144,9 +154,10 @@ double AmountOf(const std::string& unit, const RunSettings& settings, const Capt
       sum += static_cast<double>(view.camera.width) * view.camera.height;
     return sum;
   }
-  if (unit == "ray voxels") {
+  if (unit == kSplatWork) return PlanFieldFit(settings, PlaceOf(settings, capture)).seconds;
+  if (unit == kVoxelWork) {
     const FitOptions fit =
-        AdaptOptions(settings.fit, {.pixels = FittedPixels(settings, capture)});
+        AdaptOptions(settings.fit, {.pixels = PlaceOf(settings, capture).pixels});
     double sum = 0;
     for (size_t s = 0; s < std::min(fit.steps.size(), fit.resolutions.size()); ++s)
       sum += static_cast<double>(fit.steps[s]) * fit.rays_per_step * fit.resolutions[s];
@@ -178,7 +189,7 @@ std::vector<CostTerm> LearnCosts(const RunContext& run, const Capture& capture,
                                  const std::vector<Measurement>& measurements) {
   const RunSettings& base = run.settings;
   std::vector<CostTerm> costs;
-  for (StageUnits stage : AllUnits()) {
+  for (StageUnits stage : UnitsOf(base)) {
     const Workspace* const folder = IsOfScene(stage.stage) ? run.workspace : run.style;
     const auto record = folder == nullptr ? std::nullopt : folder->Find(stage.stage);
     // Photos with given poses are only read.
@@ -231,6 +242,10 @@ std::vector<StageTime> Predict(const std::vector<CostTerm>& costs, const RunSett
                                const Capture& capture) {
   std::vector<StageTime> times;
   for (const CostTerm& term : costs) {
+    if (term.unit == (settings.scene.UsesSplats() ? kVoxelWork : kSplatWork))
+      throw InputError(
+          "the costs are of fits of another kind of field", "--costs",
+          "measure them by `regrade tradeoff --field " + settings.scene.field + "`");
     auto at = std::ranges::find(times, term.stage, &StageTime::stage);
     if (at == times.end()) at = times.insert(times.end(), {term.stage, 0, 0});
     const double amount = AmountOf(term.unit, settings, capture);

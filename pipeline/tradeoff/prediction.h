@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "kernels/scene/capture.h"
+#include "pipeline/run/fit_memory.h"
 #include "pipeline/run/run_context.h"
 #include "pipeline/tradeoff/measurements.h"
 
@@ -22,13 +23,16 @@ struct StageTime {
   double seconds = 0, cpu_seconds = 0;
 };
 
-// Pixels of the photos that are fitted, at working size.
-int64_t FittedPixels(const RunSettings& settings, const Capture& capture);
+// Of a fit on the CPU: its photos and their pixels, at working size.
+FitPlace PlaceOf(const RunSettings& settings, const Capture& capture);
+// Before any photo is read, see ExpectedPixels.
+FitPlace ExpectedPlace(const RunSettings& settings, int64_t photos);
 
 // The amount of `unit` in a run with these settings:
 //   trials: of view dependence, 1 or 0, the same work for every capture |
 //   photo megapixels: at matching size | ray voxels: rays times the grid's side, over the
 //   stages that the fit of these photos has (see AdaptOptions) |
+//   planned seconds: of a fit of splats |
 //   photo pixels: at working size | staged pixels: at the original size | style rays |
 //   frame pixels | pair pixels
 double AmountOf(const std::string& unit, const RunSettings& settings, const Capture& capture);
@@ -41,6 +45,7 @@ std::vector<CostTerm> LearnCosts(const RunContext& run, const Capture& capture,
                                  const std::vector<Variant>& variants,
                                  const std::vector<Measurement>& measurements);
 
+// Throws Error(kInput) where the costs are of fits of the other kind of field.
 std::vector<StageTime> Predict(const std::vector<CostTerm>& costs, const RunSettings& settings,
                                const Capture& capture);
 

@@ -22,12 +22,12 @@
 #include "pipeline/fields/field_file.h"
 #include "pipeline/images/image_file.h"
 #include "pipeline/program/cpu_time.h"
+#include "pipeline/stages/field_fit.h"
 #include "pipeline/stages/make_stylizer.h"
 #include "pipeline/stages/photo_metrics.h"
 #include "pipeline/stages/stages.h"
 #include "pipeline/stages/styled_field.h"
 #include "pipeline/workspace/output_names.h"
-#include "reconstruct/fit/fit_field.h"
 
 namespace regrade {
 namespace {
@@ -109,12 +109,10 @@ std::vector<int> EvenlySpaced(const std::vector<int>& all, int count) {
 
 struct VariantRunner::Frames {
   StoredField stored;
-  FastGrid grid;
   std::vector<Camera> cameras;
   std::vector<Image> colors;
   std::vector<FrameGeometry> geometry;
   std::vector<PairMotion> truth;  // from each frame to the next
-  std::vector<Image> accurate;    // of the first few cameras, rays marched to the end
 };
 
 VariantRunner::VariantRunner(RunContext* base, const std::string& folder)
@@ -166,6 +164,7 @@ struct VariantRunner::Photos {
   NormalizedScene scene = {};
   std::vector<Image> pictures = {};
   std::vector<TrainingView> views = {};
+  FitPlace place = {};  // on the CPU
 };
 
 const VariantRunner::Photos& VariantRunner::PhotosAt(int size) {
@@ -173,7 +172,7 @@ const VariantRunner::Photos& VariantRunner::PhotosAt(int size) {
   photos_ = std::make_unique<Photos>(Photos{base_->Views().AtSize(size)});
   Photos& p = *photos_;
   // The box does not depend on exposures, which are known already.
-  p.scene = ProfileScene(p.working_views.capture(), base_->settings.fit.sh_degree,
+  p.scene = ProfileScene(p.working_views.capture(), base_->settings.sh_degree(),
                          base_->settings.Effects() + ",exposure=off", base_->settings.scene.box)
                 .scene;
   p.working_views = p.working_views.InField(p.scene.field_from_world, p.scene.ndc);
@@ -185,9 +184,13 @@ const VariantRunner::Photos& VariantRunner::PhotosAt(int size) {
     const int i = fitted[f];
     Image picture = p.working_views.PhotoToFit(i);
     if (picture.empty()) continue;
+    p.place.pixels += picture.num_pixels();
     p.pictures.push_back(std::move(picture));
     p.views.push_back({p.working_views.CameraOf(i), &p.pictures.back(), std::move(seen[f])});
   }
+  p.place.photos = std::ssize(p.views);
+  p.place.box = p.scene.box;
+  p.place.device_coordinates = p.scene.ndc.on();
   return p;
 }
 
@@ -198,26 +201,27 @@ void VariantRunner::MeasureFit(const Variant& variant, const ProgressFunction& p
   settings.Bind(&set);
   set.ApplyConfig(variant.options, "tradeoff");
   const Photos& photos = PhotosAt(settings.scene.photo_size);
-  FitOptions options = settings.fit;
-  options.seed = settings.run.seed + static_cast<uint64_t>(m->repeat);
+  settings.run.seed += static_cast<uint64_t>(m->repeat);
+  const std::unique_ptr<FieldFit> fit = MakeFieldFit(settings, photos.place);
+  fit->FitIntoMemory();
   // The degree chosen by the base's trial, unless it is the parameter.
   const auto record = base_->workspace->Find("reconstruct");
-  if (record && variant.parameter != "sh-degree")
-    options.sh_degree = static_cast<int>(record->metrics.At("sh_degree").AsInt());
-  FitHooks hooks;
+  if (record && !variant.parameter.ends_with("-degree"))
+    fit->LimitDegree(static_cast<int>(record->metrics.At("sh_degree").AsInt()));
+  FieldFitHooks hooks;
   hooks.progress = progress;
   Clocks clocks(m);
-  FitResult fit = FitField(photos.views, photos.scene.box, options, hooks);
+  FittedField fitted = fit->Run(photos.views, hooks);
   clocks.Stop();
-  m->work["rays"] = fit.rays;
-  m->work["samples"] = fit.samples;
-  m->work["voxels"] = fit.voxels;
+  m->work["rays"] = fitted.rays;
+  m->work["records"] = fitted.field.geometry->num_voxels();
   // Measured at the base's photo size for all variants, for comparable values.
+  const StoredField stored{std::move(fitted.field), photos.scene.field_from_world,
+                           photos.scene.ndc};
   const PhotoMetrics held_out =
       MeasureOnPhotos(photos.working_views.AtSize(base_->settings.scene.photo_size),
-                      photos.working_views.HeldOut(),
-                      {std::move(fit.field), photos.scene.field_from_world, photos.scene.ndc},
-                      Backend::kCpu, PerceptualDistance(base_->settings.consistency.lpips));
+                      photos.working_views.HeldOut(), stored, Backend::kCpu,
+                      PerceptualDistance(base_->settings.consistency.lpips));
   m->accuracy = MeanOf(held_out.psnr).value_or(std::nan(""));
   m->ssim = MeanOf(held_out.ssim);
   m->detail_kept = MeanOf(held_out.detail_kept);
@@ -262,14 +266,14 @@ const VariantRunner::Frames& VariantRunner::BaseFrames() {
   Frames& f = *frames_;
   const Workspace& base = *base_->workspace;
   f.stored = ReadFieldFile(base.Path("field.npz"));
-  f.grid = MakeFastGrid(f.stored.field);
+  const FieldRenderer renderer(f.stored.field, Backend::kCpu);
   const WorkingViews views = base_->Views().InField(f.stored);
   const int count = std::min(kFrames, views.count());
   // Flow is compared on frames of one size.
   const std::vector<Camera> cameras = WithCommonIntrinsics(views.Cameras());
   for (int i = 0; i < count; ++i) {
     const Camera& camera = cameras[static_cast<size_t>(i)];
-    const RenderedView view = RenderView(f.grid, camera, MarchOptions{f.stored.field.step});
+    const RenderedView view = renderer.Render(camera);
     f.cameras.push_back(camera);
     f.colors.push_back(view.color);
     f.geometry.push_back({DepthAlongRays(camera, view.depth), camera});
@@ -277,15 +281,12 @@ const VariantRunner::Frames& VariantRunner::BaseFrames() {
   const PairMotionFunction known =
       GeometricMotion([&f](int i) { return f.geometry[static_cast<size_t>(i)]; });
   for (int i = 0; i + 1 < count; ++i) f.truth.push_back(known(i, i + 1));
-  for (int i = 0; i < std::min(kRenderedFrames, count); ++i)
-    f.accurate.push_back(RenderView(f.grid, f.cameras[static_cast<size_t>(i)],
-                                    MarchOptions{0.25f * f.stored.field.step, 0})
-                             .color);
   return f;
 }
 
 void VariantRunner::MeasureRender(const Variant& variant, Measurement* m) {
   const Frames& f = BaseFrames();
+  const FastGrid grid = MakeFastGrid(f.stored.field);
   MarchOptions march{f.stored.field.step};
   if (const JsonValue* stop = variant.options.Find("ray-stop"))
     march.stop_transmittance = static_cast<float>(stop->AsDouble());
@@ -293,12 +294,15 @@ void VariantRunner::MeasureRender(const Variant& variant, Measurement* m) {
     march.step = static_cast<float>(step->AsDouble()) * f.stored.field.step;
   std::vector<Image> frames;
   Clocks clocks(m);
-  for (size_t i = 0; i < f.accurate.size(); ++i)
-    frames.push_back(RenderView(f.grid, f.cameras[i], march).color);
+  for (size_t i = 0; i < std::min<size_t>(kRenderedFrames, f.cameras.size()); ++i)
+    frames.push_back(RenderView(grid, f.cameras[i], march).color);
   clocks.Stop(static_cast<double>(frames.size()));
+  // Beside rays that are marched to the end.
+  const MarchOptions accurate{0.25f * f.stored.field.step, 0};
   std::vector<double> squared;
   for (size_t i = 0; i < frames.size(); ++i)
-    if (const auto error = MeanSquaredError(frames[i], f.accurate[i]))
+    if (const auto error =
+            MeanSquaredError(frames[i], RenderView(grid, f.cameras[i], accurate).color))
       squared.push_back(*error);
   m->accuracy = 255 * std::sqrt(Mean(squared));
   m->work["pixels"] = frames.empty() ? int64_t{0} : frames[0].num_pixels();

@@ -19,9 +19,10 @@ std::vector<std::string> Words(std::string_view bytes) {
 }
 
 std::vector<std::string> OptionSeeds() {
-  return {"photos\n--out\nx\n--seed=7\n--reproducible\n--fit-steps\n10,20\n--no-json",
-          "--threads\n2\n--fps\n24.5\n--\n--not-an-option",
-          "--preset\ndraft\n--effects\nndc=off"};
+  return {
+      "photos\n--out\nx\n--seed=7\n--reproducible\n--field=voxels\n--fit-steps\n10,20\n--no-"
+      "json",
+      "--threads\n2\n--fps\n24.5\n--\n--not-an-option", "--preset\ndraft\n--effects\nndc=off"};
 }
 
 bool ReadOptions(std::string_view bytes) {

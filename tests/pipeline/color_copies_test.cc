@@ -60,6 +60,8 @@ class ColorCopies : public testing::PictureTest {
                        seed,
                        "--photo-size",
                        "96",
+                       "--field",
+                       "voxels",
                        "--fit-resolutions",
                        "32",
                        "--fit-steps",

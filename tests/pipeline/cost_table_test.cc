@@ -210,13 +210,30 @@ TEST(Prediction, StagesThatTheFitLeavesOutDoNotCount) {
   settings.fit.steps = {1, 1, 1, 1, 50, 100};
   settings.run.holdout = 10;
   const Capture capture = Photos(10);
-  EXPECT_EQ(FittedPixels(settings, capture), 9 * 400 * 300);
+  EXPECT_EQ(PlaceOf(settings, capture).pixels, 9 * 400 * 300);
+  EXPECT_EQ(PlaceOf(settings, capture).photos, 9);
   EXPECT_EQ(AmountOf("ray voxels", settings, capture), 4096.0 * (48 + 96 + 192 + 384));
   settings.scene.photo_size = 200;  // 260: without the stage of 384, too
   EXPECT_EQ(AmountOf("ray voxels", settings, capture), 4096.0 * (48 + 96 + 192));
   settings.fit.fewer_stages = false;
   EXPECT_EQ(AmountOf("ray voxels", settings, capture),
             4096.0 * (48 + 96 + 192 + 384 + 50 * 768 + 100 * 1536));
+}
+
+// Half of the steps are half of the work, and costs of splats say nothing of voxels.
+TEST(Prediction, SplatsHaveTheirPlan) {
+  RunSettings settings, voxels;
+  settings.scene.field = "splats";
+  const Capture capture = Photos(10);
+  RunSettings half = settings;
+  half.splats.steps /= 2;
+  const std::vector<CostTerm> costs = {{"reconstruct", "planned seconds", 3, 5}};
+  const double all = Predict(costs, settings, capture).at(0).seconds;
+  EXPECT_NEAR(Predict(costs, half, capture).at(0).seconds, all / 2, 1e-9 * all);
+  EXPECT_REGRADE_ERROR(Predict(costs, voxels, capture), ExitCode::kInput, "another kind");
+  for (const Variant& variant : VariantsOf(settings, {}))
+    EXPECT_FALSE(variant.parameter.starts_with("fit-") || variant.benchmark == "render")
+        << variant.parameter;
 }
 
 TEST(Prediction, RefusesCostsOfAnotherSchema) {
@@ -235,7 +252,9 @@ TEST(DurationEstimate, ImprovesWithTheFirstMeasurement) {
   JsonValue::Array steps;
   for (const int count : base.fit.steps) steps.push_back(2 * count);
   twice.options["fit-steps"] = steps;
-  DurationEstimate estimate(base, {}, [](const RunSettings&) { return 4 * 768 * 768; });
+  DurationEstimate estimate(base, {}, [](const RunSettings&) {
+    return FitPlace{.pixels = 4 * 768 * 768, .photos = 4};
+  });
   EXPECT_NEAR(estimate.Seconds(twice), 2 * estimate.Seconds(own), 1e-6 * estimate.Seconds(own));
   estimate.Add({"fit", "", "", 0, 10, 15, 26});
   EXPECT_NEAR(estimate.Seconds(own), 10, 1e-9);
@@ -247,7 +266,9 @@ TEST(DurationEstimate, StagesThatTheFitLeavesOutTakeNoTime) {
   base.fit.resolutions = {48, 96, 192};
   base.fit.steps = {100, 100, 100};
   const auto seconds = [&base](int64_t pixels) {
-    return DurationEstimate(base, {}, [pixels](const RunSettings&) { return pixels; })
+    return DurationEstimate(
+               base, {},
+               [pixels](const RunSettings&) { return FitPlace{.pixels = pixels, .photos = 4}; })
         .Seconds(FitVariant("", ""));
   };
   const double all = seconds(4 * 192 * 192), two = seconds(4 * 192 * 192 - 1);

@@ -40,7 +40,7 @@ TEST(MixCommand, AStyleMayKnowDirectionsThatItsSceneDoesNot) {
                                folder / "e", "--effects", "view-dependence=off",
                                // 30 steps of an adaptive field leave too little to learn from.
                                "--fit-field", "uniform", "--keep-field"};
-  for (const std::string& flag : testing::TinyFlags()) run.push_back(flag);
+  for (const std::string& flag : testing::TinyFlags("voxels")) run.push_back(flag);
   const ProgramOutcome done = Regrade(run);
   ASSERT_EQ(done.code, 0) << done.text;
   EXPECT_EQ(ReadFieldFile(folder / "e/field.npz").field.appearance.basis, 1);

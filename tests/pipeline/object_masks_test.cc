@@ -112,6 +112,8 @@ TEST(ObjectMasks, H50_ARunWithWrongMasksRestylesTheObjectAlone) {
                                "views",
                                "--photo-size",
                                "96",
+                               "--field",
+                               "voxels",
                                "--fit-resolutions",
                                "32",
                                "--fit-steps",

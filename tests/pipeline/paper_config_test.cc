@@ -234,8 +234,8 @@ TEST(PaperConfig, ContradictionsAreRefused) {
   EXPECT_REGRADE_ERROR(Of({"--paper-config", "llff"}), ExitCode::kUsage, "--preset paper");
   EXPECT_REGRADE_ERROR(Of({"--preset", "paper", "--paper-config", "co3d"}), ExitCode::kUsage,
                        "llff");
-  EXPECT_REGRADE_ERROR(Of({"--fit-resolutions-y", "64,64,64,64,64"}), ExitCode::kUsage,
-                       "uniform");
+  EXPECT_REGRADE_ERROR(Of({"--field", "voxels", "--fit-resolutions-y", "64,64,64,64,64"}),
+                       ExitCode::kUsage, "uniform");
 }
 
 // Another preset undoes all of it.

@@ -193,8 +193,8 @@ TEST(Program, F73_ProbesReadOneFileAndReport) {
 }
 
 TEST(Program, F21_ContradictionsNameBoth) {
-  const Outcome outcome = Regrade(
-      {"reconstruct", "x", "--out", "y", "--fit-resolutions", "32", "--fit-steps", "9,9"});
+  const Outcome outcome = Regrade({"reconstruct", "x", "--out", "y", "--field", "voxels",
+                                   "--fit-resolutions", "32", "--fit-steps", "9,9"});
   EXPECT_EQ(outcome.code, 2);
   EXPECT_SAYS(outcome, "--fit-resolutions");
   EXPECT_SAYS(outcome, "--fit-steps");

@@ -119,13 +119,13 @@ TEST(ResolveSettings, LaterSourcesOverrideEarlierOnes) {
   // A field of another kind brings its rates and regularisers, and nothing over a flag.
   FitOptions uniform;
   uniform.MakeUniform();
-  r = Resolve({"--fit-field", "uniform", "--tv-sh", "0.5"});
+  r = Resolve({"--field", "voxels", "--fit-field", "uniform", "--tv-sh", "0.5"});
   EXPECT_EQ(r.settings.fit.rate_density, uniform.rate_density);
   EXPECT_EQ(r.settings.fit.tv_sh, 0.5f);
   EXPECT_EQ(r.settings.fit.resolutions, FitOptions().resolutions);
   EXPECT_FALSE(Resolve({"--preset", "best"}).settings.fit.prune_last);
   EXPECT_TRUE(Resolve({"--preset", "draft"}).settings.fit.prune_last);
-  r = Resolve({"--preset", "best", "--fit-field", "uniform"});
+  r = Resolve({"--preset", "best", "--field", "voxels", "--fit-field", "uniform"});
   EXPECT_TRUE(r.settings.fit.prune_last);  // a uniform field is what it was
   r = Resolve({"--preset", "paper", "--fit-field", "uniform"});
   EXPECT_EQ(r.settings.fit.rate_density, 30);  // its own: the field is uniform there, too
@@ -141,6 +141,21 @@ TEST(ResolveSettings, LaterSourcesOverrideEarlierOnes) {
   EXPECT_EQ(r.settings.render.fps, 12);
   EXPECT_EQ(r.settings.scene.photo_size, 64);
   EXPECT_EQ(r.settings.fit.resolutions, FitOptions().resolutions);
+}
+
+// Presets fit splats, the paper's voxels; a folder from before there was a choice has voxels.
+TEST(ResolveSettings, FlagsOfTheOtherKindOfFieldAreRefused) {
+  EXPECT_EQ(Resolve({}).settings.scene.field, "splats");
+  EXPECT_EQ(Resolve({"--preset", "paper"}).settings.scene.field, "voxels");
+  EXPECT_REGRADE_ERROR(Resolve({"--fit-steps", "10"}), ExitCode::kUsage, "--field voxels");
+  EXPECT_REGRADE_ERROR(Resolve({"--preset", "paper", "--splat-steps", "10"}), ExitCode::kUsage,
+                       "--field splats");
+  EXPECT_EQ(Resolve({"--field", "voxels", "--fit-steps", "10"}).settings.fit.steps,
+            std::vector<int>{10});
+  const TemporaryFolder folder;
+  const std::string run = folder / "run.json";
+  WriteText(run, R"({"arguments": ["/photos"], "options": {"preset": "draft"}})");
+  EXPECT_EQ(Resolve({}, {.run_json = run}).settings.scene.field, "voxels");
 }
 
 TEST(ResolveSettings, RecipeSetsEveryOptionOfTheNetwork) {
@@ -174,8 +189,9 @@ TEST(ResolveSettings, H68_AReproducibleRunOnTheGpuHasExactSums) {
   };
   EXPECT_TRUE(both({"--reproducible", "--device", "cuda"}));
   EXPECT_TRUE(both({"--reproducible", "--device", "cuda", "--recipe", "paper"}));
-  EXPECT_TRUE(both(
-      {"--reproducible", "--device", "cuda", "--no-fit-exact-sums", "--no-style-exact-sums"}));
+  EXPECT_TRUE(both({"--reproducible", "--device", "cuda", "--no-style-exact-sums"}));
+  EXPECT_TRUE(both({"--reproducible", "--device", "cuda", "--field", "voxels",
+                    "--no-fit-exact-sums", "--no-style-exact-sums"}));
   EXPECT_FALSE(both({"--reproducible"}));  // on the CPU: device auto
   EXPECT_FALSE(both({"--reproducible", "--device", "cpu"}));
   EXPECT_FALSE(both({"--device", "cuda"}));

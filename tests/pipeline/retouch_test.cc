@@ -99,9 +99,9 @@ TEST(Retouch, TheSceneFollowsEachEditAsItsExactTruth) {
       "reconstruct", folder / "s/truth", "--out", folder / "out", "--device",
       "cpu",         "--holdout",        "0"};
   for (const std::string flag :
-       {"--photo-size", "192", "--fit-resolutions", "96", "--fit-steps", "1200",
-        "--style-steps", "200", "--film-seconds", "0.125", "--fps", "24", "--film-size", "64",
-        "--threads", "2", "--tracks", "given"})
+       {"--photo-size", "192", "--splat-steps", "1200", "--splats", "10", "--style-steps",
+        "200", "--film-seconds", "0.125", "--fps", "24", "--film-size", "64", "--threads", "2",
+        "--tracks", "given"})
     reconstruct.push_back(flag);
   ProgramOutcome outcome = Regrade(reconstruct);
   ASSERT_EQ(outcome.code, 0) << outcome.text;
@@ -257,8 +257,8 @@ TEST(Retouch, ALocalEditIsLearnedFromItsPhotoAlone) {
       0);
   std::vector<std::string> reconstruct{"reconstruct",  folder / "s/truth", "--out",
                                        folder / "out", "--device",         "cpu"};
-  for (const std::string& flag : testing::TinyFlags()) reconstruct.push_back(flag);
-  reconstruct[reconstruct.size() - testing::TinyFlags().size() + 1] = "160";
+  for (const std::string& flag : testing::TinyFlags("voxels")) reconstruct.push_back(flag);
+  reconstruct[reconstruct.size() - testing::TinyFlags("voxels").size() + 1] = "160";
   ASSERT_EQ(Regrade(reconstruct).code, 0);
   const ProgramOutcome outcome =
       Regrade({"retouch", folder / "out", "--photo", "00002.png", "--edited",

@@ -73,7 +73,7 @@ TEST(RunReport, ShowsEveryPartOfTheRun) {
                                "--out",     folder / "e",       "--preset", "draft",
                                "--effects", "exposure=off",     "--device", "cpu",
                                "--verbose"};
-  for (const std::string& flag : testing::TinyFlags()) run.push_back(flag);
+  for (const std::string& flag : testing::TinyFlags("voxels")) run.push_back(flag);
   const testing::ProgramOutcome done = Regrade(run);
   ASSERT_EQ(done.code, 0) << done.text;
   EXPECT_NE(done.text.find("exposure off: not measured (off by --effects)"), std::string::npos)

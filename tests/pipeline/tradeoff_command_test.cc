@@ -36,7 +36,7 @@ TEST(TradeoffCommand, MeasuresContinuesAndPredicts) {
                                    "--parameters", "fit-steps,style-min-weight,flow,ray-stop",
                                    "--presets",    "none",
                                    "--effects",    "view-dependence=off,exposure=off"};
-    for (const std::string& flag : testing::TinyFlags()) words.push_back(flag);
+    for (const std::string& flag : testing::TinyFlags("voxels")) words.push_back(flag);
     words.insert(words.end(), more.begin(), more.end());
     return Regrade(words);
   };
@@ -118,6 +118,29 @@ TEST(TradeoffCommand, MeasuresContinuesAndPredicts) {
                      testing::ReadText(folder / "t/tradeoff.json"));
   EXPECT_EQ(Regrade({"evaluate", folder / "t/base"}).code, 0);
   EXPECT_NE(page().find("Accuracy and cost"), std::string::npos);
+}
+
+TEST(TradeoffCommand, VariesFitsOfSplats) {
+  const TemporaryFolder folder;
+  ASSERT_EQ(Regrade({"synth", folder / "s", "--views", "6", "--size", "96x72"}).code, 0);
+  std::vector<std::string> words{
+      "tradeoff",     folder / "s/truth",
+      "--out",        folder / "t",
+      "--parameters", "splat-steps,flow",
+      "--style",      testing::SourceDir() + "/assets/style_sunset.png",
+      "--presets",    "none",
+      "--repeats",    "1"};
+  for (const std::string& flag : testing::TinyFlags()) words.push_back(flag);
+  ProgramOutcome outcome = Regrade(words);
+  ASSERT_EQ(outcome.code, 0) << outcome.text;
+  // Two bases, three values of the steps and four flows.
+  const JsonValue result = ReadJsonFile(folder / "t/tradeoff.json");
+  EXPECT_EQ(result.At("costs").AsArray().size(), 2u + 3 + 4);
+  for (const JsonValue& row : result.At("costs").AsArray())
+    EXPECT_TRUE(row.At("accuracy").IsNumber()) << DumpJson(row, -1);
+  outcome = Regrade(
+      {"tradeoff", "--predict", folder / "t/base", "--costs", folder / "t/tradeoff.json"});
+  EXPECT_NE(outcome.text.find("\nreconstruct"), std::string::npos) << outcome.text;
 }
 
 TEST(TradeoffCommand, RefusesInvalidArguments) {

@@ -161,6 +161,26 @@ TEST(UpdateSplat, RegularisersHaveTheirGradient) {
     EXPECT_NEAR(first.log_scale[a] / 0.1, 0.2 * std::exp(scales[a]), 1e-7) << a;
 }
 
+// Whichever way a step is made, by coefficients or by rows.
+TEST(UpdateSplat, ColoursStayWithinTheirBounds) {
+  SplatUpdate update;
+  update.rates.sh_mean = update.rates.sh_rest = 5;
+  update.SetStep(0);
+  const float d[12] = {1, 1, -1, 1, -1, 1, 1, 1, -1, 1, 1, 1};
+  Splats rows(1, 4), each(1, 4);
+  for (Splats* splats : {&rows, &each}) {
+    Splats first(1, 4), second(1, 4);
+    const SplatMoments to{PointersOf(splats), PointersOf(&first), PointersOf(&second)};
+    if (splats == &rows) {
+      EXPECT_TRUE(UpdateColors(update, 0, 4, d, to));
+    }
+    for (int k = 0; k < 12 && splats == &each; ++k)
+      EXPECT_TRUE(UpdateColor(update, k % 4 == 0, d[k], k, to));
+    for (size_t k = 0; k < 12; ++k)
+      EXPECT_FLOAT_EQ(splats->sh[k] * d[k], k % 4 == 0 ? -std::sqrt(M_PI) : -0.2) << k;
+  }
+}
+
 // --- fits
 
 class SplatFit : public testing::FitField {

@@ -28,10 +28,16 @@ inline ProgramOutcome RunProgram(const std::string& program,
 
 // Options for the smallest possible fit, style and film: three frames, at which it is measured,
 // too.
-inline std::vector<std::string> TinyFlags() {
-  return {"--photo-size",  "64", "--fit-resolutions", "24",    "--fit-steps", "30",
-          "--style-steps", "3",  "--film-seconds",    "0.125", "--fps",       "24",
-          "--film-size",   "64", "--threads",         "2",     "--tracks",    "given"};
+inline std::vector<std::string> TinyFlags(const std::string& field = "splats") {
+  std::vector<std::string> flags = {
+      "--photo-size", "64", "--style-steps", "3", "--film-seconds", "0.125", "--fps",   "24",
+      "--film-size",  "64", "--threads",     "2", "--tracks",       "given", "--field", field};
+  const std::vector<std::string> fit =
+      field == "splats"
+          ? std::vector<std::string>{"--splat-steps", "60", "--splats", "2"}
+          : std::vector<std::string>{"--fit-resolutions", "24", "--fit-steps", "30"};
+  flags.insert(flags.end(), fit.begin(), fit.end());
+  return flags;
 }
 
 }  // namespace regrade::testing
