@@ -61,16 +61,7 @@ class CpuSplatRenderer : public SplatRenderer {
 class CudaSplatRenderer : public SplatRenderer {
  public:
   explicit CudaSplatRenderer(const RadianceField& field) : SplatRenderer(field) {
-    const SplatsView<float> splats = SplatsOf(field);
-    const int64_t n = splats.count;
-    device_ = DeviceSplats(n, splats.basis);
-    device_.count = n;
-    device_.background = splats.background;
-    device_.mean.CopyIn(splats.mean, 3 * n);
-    device_.log_scale.CopyIn(splats.log_scale, 3 * n);
-    device_.quaternion.CopyIn(splats.quaternion, 4 * n);
-    device_.opacity_logit.CopyIn(splats.opacity_logit, n);
-    device_.sh.CopyIn(splats.sh, 3 * splats.basis * n);
+    device_.Upload(SplatsOf(field));
     field_ = {};
   }
 

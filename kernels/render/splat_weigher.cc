@@ -16,13 +16,6 @@ namespace {
 
 constexpr int64_t kListsAtOnce = int64_t{256} << 20;  // bytes, of lists that are not kept
 
-bool SameView(const Camera& a, const Camera& b) {
-  const RigidTransform &p = a.camera_from_world, &q = b.camera_from_world;
-  for (int i = 0; i < 3; ++i)
-    if (!(p.rotation.row[i] == q.rotation.row[i])) return false;
-  return p.translation == q.translation && a.SameIntrinsics(b);
-}
-
 // A rectangle of places, pixels.
 struct PlaceBox {
   double u0 = INFINITY, v0 = INFINITY, u1 = -INFINITY, v1 = -INFINITY;

@@ -28,4 +28,12 @@ struct ViewRays {
   void AddPixel(int32_t camera, int x, int y) { Add(camera, x + 0.5, y + 0.5); }
 };
 
+// Whether two cameras have the same rays.
+inline bool SameView(const Camera& a, const Camera& b) {
+  const RigidTransform &p = a.camera_from_world, &q = b.camera_from_world;
+  for (int i = 0; i < 3; ++i)
+    if (!(p.rotation.row[i] == q.rotation.row[i])) return false;
+  return p.translation == q.translation && a.SameIntrinsics(b);
+}
+
 }  // namespace regrade

@@ -8,7 +8,9 @@
 #include "kernels/base/error.h"
 #include "kernels/device/device_memory.h"
 #include "kernels/image/undistort_photo.h"
+#include "kernels/splats/splat_field.h"
 #include "pipeline/capture/packed_capture.h"
+#include "pipeline/fields/field_file.h"
 #include "pipeline/files/json_file.h"
 #include "pipeline/gpu/gpu_commands.h"
 #include "reconstruct/splats/fit_splats.h"
@@ -29,12 +31,10 @@ HeldOutMeans Measure(SplatEngine* engine, const PackedCapture& capture,
   if (!frames.empty()) std::filesystem::create_directories(frames);
   for (const PackedView& view : capture.views) {
     if (!view.held_out) continue;
-    const Image photo = UndistortPhoto(view.photo, view.camera);
-    Camera camera = view.camera.Undistorted();
-    camera.ndc = {};
-    const Image seen = engine->Render(camera).color;
+    const PackedView pinhole = PinholeView(view);
+    const Image seen = engine->Render(pinhole.camera).color;
     if (!frames.empty()) WritePpm(Concat(frames, "/frame_", index++, ".ppm"), seen);
-    const auto psnr = Psnr(seen, photo), ssim = Ssim(seen, photo);
+    const auto psnr = Psnr(seen, pinhole.photo), ssim = Ssim(seen, pinhole.photo);
     if (!psnr || !ssim) continue;
     means.psnr += *psnr;
     means.ssim += *ssim;
@@ -46,6 +46,13 @@ HeldOutMeans Measure(SplatEngine* engine, const PackedCapture& capture,
 }
 
 }  // namespace
+
+PackedView PinholeView(PackedView view) {
+  view.photo = UndistortPhoto(view.photo, view.camera);
+  view.camera = view.camera.Undistorted();
+  view.camera.ndc = {};
+  return view;
+}
 
 void FitSplatsPacked(const FitSplatsOptions& settings, const SplatFitOptions& fit) {
   const double start = ClockSeconds();
@@ -75,6 +82,12 @@ void FitSplatsPacked(const FitSplatsOptions& settings, const SplatFitOptions& fi
   };
   const double read_seconds = ClockSeconds() - start;
   const SplatFitResult result = FitSplats(views, capture.scene.box, options, hooks, backend);
+  const SceneBox& box = capture.scene.box;
+  if (!settings.field.empty())
+    WriteFieldFile(settings.field, {FieldOfSplats(result.splats, {{}, box.center, box.radius},
+                                                  box.near_clip, options.antialiased),
+                                    capture.scene.field_from_world,
+                                    {}});
   JsonValue::Array curve;
   for (size_t i = 0; i < result.curve.size();
        i += std::max<size_t>(1, result.curve.size() / 100))

@@ -5,6 +5,7 @@
 
 #include "kernels/base/options.h"
 #include "kernels/field/cuda/device_rays.h"
+#include "kernels/render/field_renderer.h"
 #include "pipeline/capture/packed_capture.h"
 #include "pipeline/files/json_file.h"
 #include "pipeline/program/option_binding.h"
@@ -56,6 +57,7 @@ struct FitPackedOptions {
 
 struct FitSplatsOptions {
   std::string capture;  // packed
+  std::string field;    // .npz to write; empty: none
   std::string frames;   // folder for pictures; empty: none
   std::string device = "cuda";
   uint64_t seed = 0;
@@ -63,6 +65,7 @@ struct FitSplatsOptions {
   template <typename Bind>
   void Describe(Bind& bind) {
     bind("capture", capture, {.help = "a file of `regrade pack`"});
+    bind("field", field, {.help = "the .npz file that the field is written to"});
     bind("frames", frames, {.help = "a folder for .ppm pictures of the held-out views"});
     bind("device", device, {.help = "where arithmetic runs", .choices = "cpu|cuda"});
     bind("seed", seed, {.help = "seed of all random numbers"});
@@ -82,7 +85,7 @@ struct StylePackedOptions {
   template <typename Bind>
   void Describe(Bind& bind) {
     bind("capture", capture, {.help = "a file of `regrade pack --style`"});
-    bind("field", field, {.help = "the .npz file that `regrade_gpu fit --field` wrote"});
+    bind("field", field, {.help = "the .npz file that `regrade_gpu fit|splats --field` wrote"});
     bind("styled", styled, {.help = "the .npz file that the restyled field is written to"});
     bind("frames", frames,
          {.help = "a folder for .ppm pictures of the held-out views before and after"});
@@ -122,11 +125,18 @@ double RenderMilliseconds(const DeviceGrid& grid, const PackedCapture& capture,
 // The same for a row of settings of the march and of faster frames: milliseconds, and the error
 // against the first in dB, PSNR, SSIM and detail kept to the photos.
 JsonValue RenderCosts(const DeviceGrid& grid, const PackedCapture& capture, float step);
+// Of a field of any kind, which is uploaded for that; splats have one row.
+JsonValue RenderCosts(const RadianceField& field, const PackedCapture& capture);
+
+// A view as splats show it: through a lens without distortion, in the world. The photo is NaN
+// where it does not reach.
+PackedView PinholeView(PackedView view);
+// Of a field's capture: pinholes, if it has splats.
+PackedCapture ReadCaptureFor(const RadianceField& field, const std::string& path);
 
 // The held-out views, exact, as pictures NAME_0.ppm, NAME_1.ppm, ...
-void RenderHeldOut(const DeviceGrid& grid, const PackedCapture& capture,
-                   const MarchOptions& march, const std::string& folder,
-                   const std::string& name);
+void RenderHeldOut(const FieldRenderer& renderer, const PackedCapture& capture,
+                   const std::string& folder, const std::string& name);
 
 // Writes an 8-bit picture. Throws Error(kResources).
 void WritePpm(const std::string& path, const Image& image);

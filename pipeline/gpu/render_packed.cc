@@ -5,6 +5,7 @@
 #include <cstdio>
 #include <filesystem>
 #include <fstream>
+#include <utility>
 
 #include "kernels/base/error.h"
 #include "kernels/field/cuda/device_rays.h"
@@ -22,30 +23,37 @@ void WritePpm(const std::string& path, const Image& image) {
   if (!file) throw ResourceError("cannot be written", path, "is the disk full?");
 }
 
-void RenderHeldOut(const DeviceGrid& grid, const PackedCapture& capture,
-                   const MarchOptions& march, const std::string& folder,
-                   const std::string& name) {
+PackedCapture ReadCaptureFor(const RadianceField& field, const std::string& path) {
+  PackedCapture capture = ReadPackedCapture(path);
+  if (field.geometry->splats.on())
+    for (PackedView& view : capture.views) view = PinholeView(std::move(view));
+  return capture;
+}
+
+void RenderHeldOut(const FieldRenderer& renderer, const PackedCapture& capture,
+                   const std::string& folder, const std::string& name) {
   std::filesystem::create_directories(folder);
   int index = 0;
   for (const PackedView& view : capture.views)
     if (view.held_out)
       WritePpm(Concat(folder, "/", name, "_", index++, ".ppm"),
-               RenderViewOnDevice(grid, view.camera, march).color);
+               renderer.Render(view.camera).color);
 }
 
 void RenderPacked(const RenderPackedOptions& settings) {
-  const PackedCapture capture = ReadPackedCapture(settings.capture);
-  const StoredField stored = ReadFieldFile(settings.field);
-  const DeviceGrid grid = UploadGrid(MakeFastGrid(stored.field));
+  const RadianceField field = ReadFieldFile(settings.field).field;
+  const PackedCapture capture = ReadCaptureFor(field, settings.capture);
   if (!settings.frames.empty() && !settings.compare)
-    RenderHeldOut(grid, capture, {stored.field.step}, settings.frames, "frame");
-  JsonValue record = JsonValue::Object{{"capture", settings.capture},
-                                       {"device", ReadDeviceStatus().name},
-                                       {"voxels", stored.field.geometry->num_voxels()}};
+    RenderHeldOut(FieldRenderer(field, Backend::kCuda), capture, settings.frames, "frame");
+  JsonValue record = JsonValue::Object{
+      {"capture", settings.capture},
+      {"device", ReadDeviceStatus().name},
+      {field.geometry->splats.on() ? "splats" : "voxels", field.geometry->num_voxels()}};
   if (settings.compare)
-    record["compare"] = CompareRenderers(grid, capture, stored.field.step, settings);
+    record["compare"] =
+        CompareRenderers(UploadGrid(MakeFastGrid(field)), capture, field.step, settings);
   else
-    record["render"] = RenderCosts(grid, capture, stored.field.step);
+    record["render"] = RenderCosts(field, capture);
   std::printf("%s\n", DumpJson(record, -1).c_str());
   std::fflush(stdout);
 }

@@ -1,5 +1,6 @@
 // regrade_gpu style: restyles a packed capture's field after its style picture.
 #include <algorithm>
+#include <cmath>
 #include <cstdio>
 #include <memory>
 #include <optional>
@@ -10,8 +11,9 @@
 #include "evaluate/fidelity.h"
 #include "kernels/base/clock.h"
 #include "kernels/base/error.h"
-#include "kernels/field/cuda/device_rays.h"
-#include "kernels/field/packed_grid.h"
+#include "kernels/device/device_memory.h"
+#include "kernels/image/undistort_photo.h"
+#include "kernels/render/field_renderer.h"
 #include "pipeline/fields/field_file.h"
 #include "pipeline/fields/network_file.h"
 #include "pipeline/files/json_file.h"
@@ -35,24 +37,39 @@ class Stopwatch {
   double last_ = ClockSeconds();
 };
 
+// 0 where a photo does not reach, and the photo filled there; empty where it is whole.
+Image MaskAndFill(Image* photo) {
+  Image mask(photo->width, photo->height, 1);
+  bool whole = true;
+  for (int64_t i = 0; i < photo->num_pixels(); ++i) {
+    const bool reaches = std::isfinite(photo->pixels[static_cast<size_t>(3 * i)]);
+    mask.pixels[static_cast<size_t>(i)] = reaches ? 1.0f : 0.0f;
+    whole = whole && reaches;
+  }
+  if (whole) return {};
+  FillBeyond(photo);
+  return mask;
+}
+
 // What MKL makes of the views that the field was fitted to.
 TrainingTargets StyleViews(const PackedCapture& capture) {
   TrainingTargets targets;
   const std::unique_ptr<ViewStylizer> method = MakeColorTransfer(StyleOptions(), capture.style);
   for (size_t i = 0; i < capture.views.size(); ++i) {
     const PackedView& view = capture.views[i];
-    if (!view.held_out)
-      targets.Add({.camera = view.camera, .name = view.file}, view.photo,
-                  method->Stylize(view.photo, static_cast<int>(i)));
+    if (view.held_out) continue;
+    Image photo = view.photo;
+    Image mask = MaskAndFill(&photo);
+    targets.Add({.camera = view.camera, .name = view.file}, photo,
+                method->Stylize(photo, static_cast<int>(i)), std::move(mask));
   }
   return targets;
 }
 
-std::vector<Image> HeldOutFrames(const DeviceGrid& grid, const PackedCapture& capture,
-                                 const MarchOptions& march) {
+std::vector<Image> HeldOutFrames(const FieldRenderer& renderer, const PackedCapture& capture) {
   std::vector<Image> frames;
   for (const PackedView& view : capture.views)
-    if (view.held_out) frames.push_back(RenderViewOnDevice(grid, view.camera, march).color);
+    if (view.held_out) frames.push_back(renderer.Render(view.camera).color);
   return frames;
 }
 
@@ -80,33 +97,33 @@ JsonValue MeasureHeldOutFidelity(const std::vector<Image>& unstyled,
                            {"chroma_2d", value(row.chroma_2d)}};
 }
 
-// Renders the held-out views and measures frame times, of a field that is uploaded for that.
-// `unstyled`: its frames before.
+// Renders the held-out views and measures frame times. `unstyled`: its frames before.
 void MeasureFrames(const RadianceField& field, const PackedCapture& capture,
                    const std::vector<Image>& unstyled, const std::string& frames,
                    JsonValue* record) {
-  const MarchOptions march{field.step};
-  const DeviceGrid grid = UploadGrid(MakeFastGrid(field));
-  Stopwatch watch;
-  const auto first = std::ranges::find_if(capture.views, &PackedView::held_out);
-  if (first != capture.views.end()) RenderViewOnDevice(grid, first->camera, march);
-  (*record)["seconds_first_frame"] = watch.Lap();
-  (*record)["render"] = RenderCosts(grid, capture, march.step);
-  if (!unstyled.empty())
-    (*record)["held_out"] =
-        MeasureHeldOutFidelity(unstyled, HeldOutFrames(grid, capture, march), capture.style);
-  if (!frames.empty()) RenderHeldOut(grid, capture, march, frames, "styled");
+  {
+    const FieldRenderer renderer(field, Backend::kCuda);
+    Stopwatch watch;
+    const auto first = std::ranges::find_if(capture.views, &PackedView::held_out);
+    if (first != capture.views.end()) renderer.Render(first->camera);
+    (*record)["seconds_first_frame"] = watch.Lap();
+    if (!unstyled.empty())
+      (*record)["held_out"] =
+          MeasureHeldOutFidelity(unstyled, HeldOutFrames(renderer, capture), capture.style);
+    if (!frames.empty()) RenderHeldOut(renderer, capture, frames, "styled");
+  }
+  (*record)["render"] = RenderCosts(field, capture);
 }
 
 }  // namespace
 
 void StylePacked(const StylePackedOptions& settings, const TrainNetworkOptions& options) {
   Stopwatch watch;
-  const PackedCapture capture = ReadPackedCapture(settings.capture);
+  StoredField stored = ReadFieldFile(settings.field);
+  const PackedCapture capture = ReadCaptureFor(stored.field, settings.capture);
   if (capture.style.num_pixels() == 0)
     throw InputError("holds no style picture", settings.capture,
                      "pack it with --style PICTURE");
-  StoredField stored = ReadFieldFile(settings.field);
   const int64_t voxels = stored.field.geometry->num_voxels();
   JsonValue record = JsonValue::Object{{"capture", settings.capture}};
   record["seconds_read"] = watch.Lap();
@@ -119,24 +136,25 @@ void StylePacked(const StylePackedOptions& settings, const TrainNetworkOptions& 
   const bool on_device = request.backend == Backend::kCuda;
   std::vector<Image> unstyled;
   if (on_device) {
-    const DeviceGrid grid = UploadGrid(MakeFastGrid(stored.field));
-    unstyled = HeldOutFrames(grid, capture, {stored.field.step});
-    if (!settings.frames.empty())
-      RenderHeldOut(grid, capture, {stored.field.step}, settings.frames, "source");
+    const FieldRenderer renderer(stored.field, Backend::kCuda);
+    unstyled = HeldOutFrames(renderer, capture);
+    if (!settings.frames.empty()) RenderHeldOut(renderer, capture, settings.frames, "source");
   }
   watch.Lap();
 
   int64_t free_before = 0, least_free = 0;  // bytes on the device, beside the field
+  Stopwatch steps;
+  double seconds_start = 0, seconds_steps = 0;
+  int reports = 0;
   RestyleHooks hooks;
   hooks.finished = [&](RestyleHooks::Part part) {
     const char* const names[] = {"seconds_upload", "seconds_learn", "seconds_restyle"};
     record[names[static_cast<int>(part)]] = watch.Lap();
+    const double since_last_step = steps.Lap();
+    if (part == RestyleHooks::Part::kTraining) record["seconds_conclusion"] = since_last_step;
     if (on_device && part == RestyleHooks::Part::kUpload)
       free_before = least_free = ReadDeviceStatus().free_bytes;
   };
-  Stopwatch steps;
-  double seconds_start = 0, seconds_steps = 0;
-  int reports = 0;
   hooks.training.progress = [&](const Progress&) {
     (reports++ == 0 ? seconds_start : seconds_steps) += steps.Lap();
     if (on_device && reports % 4 == 1)
@@ -154,7 +172,7 @@ void StylePacked(const StylePackedOptions& settings, const TrainNetworkOptions& 
   record["seconds_other_steps"] = seconds_steps;
   if (on_device) MeasureFrames(restyled.styled, capture, unstyled, settings.frames, &record);
   record["device"] = on_device ? ReadDeviceStatus().name : "cpu";
-  record["voxels"] = voxels;
+  record[restyled.styled.geometry->splats.on() ? "splats" : "voxels"] = voxels;
   record["steps"] = trained.steps;
   record["mean_touched_voxels"] = trained.mean_touched_voxels;
   record["mib_beyond_the_field"] = static_cast<double>(free_before - least_free) / (1 << 20);

@@ -190,7 +190,7 @@ StageOutcome Stylize(RunContext* context, const JsonValue& inputs,
   }
   SetVariance(restyled, targets.targets().views(), settings.run.seed, request.object_weights,
               &metrics);
-  metrics.device = DeviceName(BackendForStyle(request.backend, restyled.source));
+  metrics.device = DeviceName(request.backend);
   metrics.notices = restyled.notices;
   for (const std::string& warning : trained.warnings) metrics.notices.push_back(warning);
   if (const std::string why = WhySteep(trained); !why.empty()) {

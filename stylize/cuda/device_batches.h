@@ -1,4 +1,5 @@
-// Rays of several steps to come, on a CUDA device: each step takes its own without the host.
+// Rays of several steps to come, and what they see of splats, on a CUDA device: each step takes
+// its own without the host.
 #pragma once
 
 #include <cstdint>
@@ -6,6 +7,8 @@
 #include "kernels/base/vec.h"
 #include "kernels/device/device_memory.h"
 #include "kernels/scene/camera.h"
+#include "kernels/splats/cuda/device_splat_weigher.h"
+#include "stylize/cuda/device_ray_weights.h"
 
 namespace regrade {
 
@@ -26,5 +29,11 @@ struct DeviceBatches {
 // not wait.
 void TakeBatch(const DeviceBatches& batches, const int64_t* step, Ray* step_rays,
                Vec3f* step_targets);
+
+// The samples of group *step % groups, or if `step` is null of the first one, take the place of
+// those that DeviceRayWeights::Launch would march, in the room that Reserve has made. Marks are
+// added to `touched` unless it is null. Does not wait.
+void TakeSamples(const DeviceSplatSamples& samples, const int64_t* step,
+                 DeviceRayWeights* weights, DeviceTouched* touched);
 
 }  // namespace regrade

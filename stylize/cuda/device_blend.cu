@@ -15,8 +15,9 @@ namespace regrade {
 namespace {
 
 // The point at corner k < 8 of a sample's cell, or -1; see CornerPoints.
-__device__ int32_t CornerPoint(const DeviceGridView& grid, const DeviceWeightedSample& sample,
+__device__ int32_t CornerPoint(const StyleFieldView& grid, const DeviceWeightedSample& sample,
                                int k) {
+  if (grid.mean != nullptr) return k == 0 ? sample.vertex : -1;
   if (sample.vertex >= 0 && grid.cells.top != nullptr)
     return grid.cells.corner[sample.vertex + k];
   if (sample.vertex >= 0)
@@ -40,18 +41,20 @@ struct WarpSample {
   float corner;  // its trilinear weight
   float gamma;   // this lane's basis function along the ray, 0 beyond the field's own
 
-  __device__ WarpSample(const DeviceGridView& grid, int basis, const DeviceWeightedSample& s,
+  // `rays`: null where gamma is not needed.
+  __device__ WarpSample(const StyleFieldView& field, const DeviceWeightedSample& s,
                         const int32_t* slot_of_point, const Ray* rays)
       : sample(s), lane(static_cast<int>(threadIdx.x & 31)), slot(-1), corner(0), gamma(0) {
+    const bool splat = field.mean != nullptr;
     if (lane < 8) {
-      const int32_t point = CornerPoint(grid, sample, lane);
+      const int32_t point = CornerPoint(field, sample, lane);
       if (point >= 0) slot = slot_of_point[point];
-      corner = CornerWeight(sample.fraction, lane);
+      corner = splat ? 1.0f : CornerWeight(sample.fraction, lane);
     }
     if (rays == nullptr) return;
-    if (sample.vertex < 0) basis = 1;  // background spheres have plain colours
+    const int basis = sample.vertex < 0 ? 1 : field.basis;  // spheres have plain colours
     float all[kMaxBasis];
-    ShBasis(kMaxBasis, rays[sample.ray].direction, all);
+    ShBasis(kMaxBasis, splat ? sample.fraction : rays[sample.ray].direction, all);
 #pragma unroll
     for (int k = 0; k < kMaxBasis; ++k)
       if (lane < 27 && lane % 9 == k && k < basis) gamma = all[k];
@@ -103,14 +106,13 @@ __global__ void AddBackgroundKernel(Vec3f background, const float* transmittance
 }
 
 template <bool kExact>
-__global__ void BlendColorsKernel(DeviceGridView grid, int basis,
-                                  const DeviceWeightedSample* samples, int64_t n,
-                                  const int32_t* counted, const int32_t* slot_of_point,
-                                  const Ray* rays, const float* rows, float* color,
-                                  uint8_t* unclamped) {
+__global__ void BlendColorsKernel(StyleFieldView field, const DeviceWeightedSample* samples,
+                                  int64_t n, const int32_t* counted,
+                                  const int32_t* slot_of_point, const Ray* rays,
+                                  const float* rows, float* color, uint8_t* unclamped) {
   const int64_t i = ItemOfWarp(n, counted);
   if (i < 0) return;
-  const WarpSample warp(grid, basis, samples[i], slot_of_point, rays);
+  const WarpSample warp(field, samples[i], slot_of_point, rays);
   const float sum = ChannelSums(warp.Blend(rows) * warp.gamma, warp.lane);
   const float value = 0.5f + sum;  // of a channel on its first lane
   const bool first = warp.lane < 27 && warp.lane % 9 == 0;
@@ -124,7 +126,7 @@ __global__ void BlendColorsKernel(DeviceGridView grid, int basis,
 }
 
 template <bool kExact>
-__global__ void BlendColorsAdjointKernel(DeviceGridView grid, int basis,
+__global__ void BlendColorsAdjointKernel(StyleFieldView field,
                                          const DeviceWeightedSample* samples, int64_t n,
                                          const int32_t* counted, const int32_t* slot_of_point,
                                          const Ray* rays, const uint8_t* unclamped,
@@ -135,7 +137,7 @@ __global__ void BlendColorsAdjointKernel(DeviceGridView grid, int basis,
   if (bits == 0) return;
   const Vec3f d = d_color[samples[i].ray];
   if (d.x == 0 && d.y == 0 && d.z == 0) return;
-  const WarpSample warp(grid, basis, samples[i], slot_of_point, rays);
+  const WarpSample warp(field, samples[i], slot_of_point, rays);
   const bool is_mass = warp.lane >= kMassLane && warp.lane < kMassLane + 3;
   const int c = is_mass ? warp.lane - kMassLane : warp.lane / 9;
   float d_blend = 0;
@@ -152,12 +154,12 @@ __global__ void BlendColorsAdjointKernel(DeviceGridView grid, int basis,
 }
 
 template <bool kExact>
-__global__ void BlendRowsKernel(DeviceGridView grid, const DeviceWeightedSample* samples,
+__global__ void BlendRowsKernel(StyleFieldView field, const DeviceWeightedSample* samples,
                                 int64_t n, const int32_t* counted, const int32_t* slot_of_point,
                                 const float* rows, float* sums) {
   const int64_t i = ItemOfWarp(n, counted);
   if (i < 0) return;
-  const WarpSample warp(grid, 1, samples[i], slot_of_point, nullptr);
+  const WarpSample warp(field, samples[i], slot_of_point, nullptr);
   AddTo<kExact>(sums, int64_t{warp.sample.ray} * kRowLanes + warp.lane,
                 warp.sample.weight * warp.Blend(rows));
 }
@@ -173,7 +175,7 @@ void TakeExact(const float* exact, int64_t n, const int32_t* counted, float* val
 
 }  // namespace
 
-void BlendColors(const DeviceGrid& grid, const DeviceRayWeights& weights,
+void BlendColors(const DeviceStyleField& field, const DeviceRayWeights& weights,
                  const DeviceSlots& slots, const Ray* rays, const float* rows, Vec3f* color,
                  uint8_t* unclamped, float* exact) {
   const int64_t values = 3 * weights.num_rays;
@@ -183,25 +185,25 @@ void BlendColors(const DeviceGrid& grid, const DeviceRayWeights& weights,
   if (weights.num_samples > 0) {
     const auto kernel = exact != nullptr ? BlendColorsKernel<true> : BlendColorsKernel<false>;
     kernel<<<BlocksFor(32 * weights.num_samples), kThreads, 0, LaunchStream()>>>(
-        grid.view(), grid.basis, weights.samples.data(), weights.num_samples,
-        weights.counter.data(), slots.slot_of_point.data(), rays, rows, sums, unclamped);
+        field.view(), weights.samples.data(), weights.num_samples, weights.counter.data(),
+        slots.slot_of_point.data(), rays, rows, sums, unclamped);
     CheckLaunch("blend_colors");
   }
   if (exact != nullptr) TakeExact(exact, values, nullptr, &color->x);
   AddBackgroundKernel<<<BlocksFor(weights.num_rays), kThreads, 0, LaunchStream()>>>(
-      grid.background, weights.transmittance.data(), weights.num_rays, color);
+      field.grid.background, weights.transmittance.data(), weights.num_rays, color);
   CheckLaunch("add_background");
 }
 
-void BlendColorsAdjoint(const DeviceGrid& grid, const DeviceRayWeights& weights,
+void BlendColorsAdjoint(const DeviceStyleField& field, const DeviceRayWeights& weights,
                         const DeviceSlots& slots, const Ray* rays, const uint8_t* unclamped,
                         const Vec3f* d_color, float* d_rows, float* exact) {
   if (weights.num_samples > 0) {
     const auto kernel =
         exact != nullptr ? BlendColorsAdjointKernel<true> : BlendColorsAdjointKernel<false>;
     kernel<<<BlocksFor(32 * weights.num_samples), kThreads, 0, LaunchStream()>>>(
-        grid.view(), grid.basis, weights.samples.data(), weights.num_samples,
-        weights.counter.data(), slots.slot_of_point.data(), rays, unclamped, d_color,
+        field.view(), weights.samples.data(), weights.num_samples, weights.counter.data(),
+        slots.slot_of_point.data(), rays, unclamped, d_color,
         exact != nullptr ? exact : d_rows);
     CheckLaunch("blend_colors_adjoint");
   }
@@ -209,7 +211,7 @@ void BlendColorsAdjoint(const DeviceGrid& grid, const DeviceRayWeights& weights,
     TakeExact(exact, slots.num_slots * kRowLanes, slots.counter.data(), d_rows);
 }
 
-void BlendRows(const DeviceGrid& grid, const DeviceRayWeights& weights,
+void BlendRows(const DeviceStyleField& field, const DeviceRayWeights& weights,
                const DeviceSlots& slots, const float* rows, float* sums, float* exact) {
   const int64_t values = weights.num_rays * kRowLanes;
   if (values == 0) return;
@@ -218,7 +220,7 @@ void BlendRows(const DeviceGrid& grid, const DeviceRayWeights& weights,
   if (weights.num_samples > 0) {
     const auto kernel = exact != nullptr ? BlendRowsKernel<true> : BlendRowsKernel<false>;
     kernel<<<BlocksFor(32 * weights.num_samples), kThreads, 0, LaunchStream()>>>(
-        grid.view(), weights.samples.data(), weights.num_samples, weights.counter.data(),
+        field.view(), weights.samples.data(), weights.num_samples, weights.counter.data(),
         slots.slot_of_point.data(), rows, to);
     CheckLaunch("blend_rows");
   }
@@ -227,16 +229,16 @@ void BlendRows(const DeviceGrid& grid, const DeviceRayWeights& weights,
 
 #else
 
-void BlendColors(const DeviceGrid&, const DeviceRayWeights&, const DeviceSlots&, const Ray*,
-                 const float*, Vec3f*, uint8_t*, float*) {
+void BlendColors(const DeviceStyleField&, const DeviceRayWeights&, const DeviceSlots&,
+                 const Ray*, const float*, Vec3f*, uint8_t*, float*) {
   DeviceWait("blend_colors");
 }
-void BlendColorsAdjoint(const DeviceGrid&, const DeviceRayWeights&, const DeviceSlots&,
+void BlendColorsAdjoint(const DeviceStyleField&, const DeviceRayWeights&, const DeviceSlots&,
                         const Ray*, const uint8_t*, const Vec3f*, float*, float*) {
   DeviceWait("blend_colors_adjoint");
 }
-void BlendRows(const DeviceGrid&, const DeviceRayWeights&, const DeviceSlots&, const float*,
-               float*, float*) {
+void BlendRows(const DeviceStyleField&, const DeviceRayWeights&, const DeviceSlots&,
+               const float*, float*, float*) {
   DeviceWait("blend_rows");
 }
 

@@ -1,4 +1,4 @@
-// Sample weights of rays on a CUDA device, and colours blended from rows of the voxels that
+// Sample weights of rays on a CUDA device, and colours blended from rows of the points that
 // they touch: ray_weights.h and LipRF's second stage there. Samples of many rays lie in one
 // list in no fixed order, each with its ray.
 #pragma once
@@ -8,20 +8,22 @@
 #include "kernels/field/cuda/device_grid.h"
 #include "kernels/field/cuda/device_rays.h"
 #include "stylize/cuda/device_rows.h"
+#include "stylize/cuda/device_style_field.h"
 
 namespace regrade {
 
 // As WeightedSample.
 struct DeviceWeightedSample {
   // Lowest corner of the cell; of an adaptive field, eight times the cell; negative on a
-  // background sphere.
+  // background sphere. Or a splat.
   int32_t vertex;
-  Vec3f fraction;
+  Vec3f fraction;  // within the cell; of a splat, the direction from the camera to it
   float weight;
   int32_t ray;
 };
 
 // The samples of a batch of rays that weigh more than min_weight, and which voxels they touch.
+// Those of splats are not marched, see TakeSamples.
 struct DeviceRayWeights {
   DeviceBuffer<DeviceWeightedSample> samples;
   DeviceBuffer<float> transmittance;  // [rays]
@@ -69,19 +71,19 @@ void ClampToCapacity(int64_t slot_capacity, DeviceRayWeights* weights, DeviceSlo
 // summed there as integers (AddExact in gradient_view.h), and the result is the same in any
 // order.
 
-// The colours of rays whose voxels have the rows of `slots` instead of their own: color [rays]
+// The colours of rays whose points have the rows of `slots` instead of their own: color [rays]
 // begins with the background and is not clipped at 1. unclamped [samples]: bit c is set where
 // the clamp at 0 left channel c alone.
-void BlendColors(const DeviceGrid& grid, const DeviceRayWeights& weights,
+void BlendColors(const DeviceStyleField& field, const DeviceRayWeights& weights,
                  const DeviceSlots& slots, const Ray* rays, const float* rows, Vec3f* color,
                  uint8_t* unclamped, float* exact);
 // Its adjoint: adds to d_rows [slots, kRowLanes], the masses of EQ(view-penalty) among them.
 // With `exact` it adds to that, and d_rows is what has been added since it was zero.
-void BlendColorsAdjoint(const DeviceGrid& grid, const DeviceRayWeights& weights,
+void BlendColorsAdjoint(const DeviceStyleField& field, const DeviceRayWeights& weights,
                         const DeviceSlots& slots, const Ray* rays, const uint8_t* unclamped,
                         const Vec3f* d_color, float* d_rows, float* exact);
 // sums [rays, kRowLanes] = sum_i w_i of the blended rows themselves.
-void BlendRows(const DeviceGrid& grid, const DeviceRayWeights& weights,
+void BlendRows(const DeviceStyleField& field, const DeviceRayWeights& weights,
                const DeviceSlots& slots, const float* rows, float* sums, float* exact);
 
 }  // namespace regrade

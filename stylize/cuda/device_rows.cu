@@ -4,6 +4,7 @@
 #include "kernels/field/cuda/gradient_view.h"
 #include "stylize/cuda/device_rows.h"
 #include "stylize/cuda/warp_item.h"
+#include "stylize/field/splat_position.h"
 #include "stylize/field/view_penalty.h"
 
 namespace regrade {
@@ -12,8 +13,12 @@ namespace regrade {
 
 namespace {
 
-// Of a voxel, or of an adaptive field's vertex: [-1, 1] across the box.
-__device__ Vec3f BoxPosition(const DeviceGridView& grid, int64_t voxel) {
+// Of a voxel, or of an adaptive field's vertex: [-1, 1] across the box. Or of a splat.
+__device__ Vec3f BoxPosition(const StyleFieldView& grid, int64_t voxel) {
+  if (grid.mean != nullptr) {
+    const float* const mean = grid.mean + 3 * voxel;
+    return SplatPosition(grid.frame, {mean[0], mean[1], mean[2]});
+  }
   const Vec3i size = grid.frame.resolution;
   Vec3f place{0.5f, 0.5f, 0.5f};  // voxels from the box's corner
   if (grid.vertex_key != nullptr) {
@@ -28,9 +33,9 @@ __device__ Vec3f BoxPosition(const DeviceGridView& grid, int64_t voxel) {
 }
 
 // A warp a point; see FillFeatures and FillTexelFeatures.
-__global__ void GatherRowsKernel(DeviceGridView grid, int basis, const int32_t* points,
-                                 int64_t first, int64_t n, const int32_t* counted,
-                                 float position_scale, float* rows) {
+__global__ void GatherRowsKernel(StyleFieldView grid, const int32_t* points, int64_t first,
+                                 int64_t n, const int32_t* counted, float position_scale,
+                                 float* rows) {
   const int64_t i = ItemOfWarp(n, counted);
   if (i < 0) return;
   const int lane = static_cast<int>(threadIdx.x & 31);
@@ -48,8 +53,8 @@ __global__ void GatherRowsKernel(DeviceGridView grid, int basis, const int32_t* 
                                                  at % spheres.resolution)[lane - 27];
     }
   } else if (lane < 27) {
-    if (lane % 9 < basis)
-      value = grid.records[voxel * grid.stride + lane / 9 * basis + lane % 9];
+    if (lane % 9 < grid.basis)
+      value = grid.records[voxel * grid.stride + lane / 9 * grid.basis + lane % 9];
   } else if (lane < 30) {
     value = position_scale * BoxPosition(grid, voxel)[lane - 27];
   }
@@ -102,8 +107,8 @@ __global__ void AddViewPenaltyKernel(Mat3f matrix, const float* from, const floa
   if (of_block != 0) atomicAdd(loss, ExactTerm(double{view_weight} * of_block));
 }
 
-__global__ void ScatterRowsKernel(const float* rows, int64_t first, int64_t n, int basis,
-                                  DeviceGridView grid) {
+__global__ void ScatterRowsKernel(const float* rows, int64_t first, int64_t n,
+                                  StyleFieldView grid) {
   const int64_t i = ItemOfWarp(n, nullptr);
   if (i < 0) return;
   const int lane = static_cast<int>(threadIdx.x & 31);
@@ -111,8 +116,8 @@ __global__ void ScatterRowsKernel(const float* rows, int64_t first, int64_t n, i
   if (lane >= 27) return;
   const float value = rows[i * kRowLanes + lane];
   if (voxel < grid.num_voxels) {
-    if (lane % 9 < basis)
-      grid.records[voxel * grid.stride + lane / 9 * basis + lane % 9] = value;
+    if (lane % 9 < grid.basis)
+      grid.records[voxel * grid.stride + lane / 9 * grid.basis + lane % 9] = value;
   } else if (lane % 9 == 0) {
     grid.spheres.texels[4 * (voxel - grid.first_texel()) + lane / 9] = value;
   }
@@ -120,11 +125,11 @@ __global__ void ScatterRowsKernel(const float* rows, int64_t first, int64_t n, i
 
 }  // namespace
 
-void GatherRows(const DeviceGrid& grid, const int32_t* points, int64_t first, int64_t n,
+void GatherRows(const DeviceStyleField& field, const int32_t* points, int64_t first, int64_t n,
                 float position_scale, float* rows, const int32_t* counted) {
   if (n == 0) return;
   GatherRowsKernel<<<BlocksFor(32 * n), kThreads, 0, LaunchStream()>>>(
-      grid.view(), grid.basis, points, first, n, counted, position_scale, rows);
+      field.view(), points, first, n, counted, position_scale, rows);
   CheckLaunch("gather_rows");
 }
 
@@ -144,16 +149,16 @@ void AddViewPenalty(const Mat3f& matrix, const float* from, const float* rows, i
   CheckLaunch("add_view_penalty");
 }
 
-void ScatterRows(const float* rows, int64_t first, int64_t n, DeviceGrid* grid) {
+void ScatterRows(const float* rows, int64_t first, int64_t n, DeviceStyleField* field) {
   if (n == 0) return;
-  ScatterRowsKernel<<<BlocksFor(32 * n), kThreads, 0, LaunchStream()>>>(
-      rows, first, n, grid->basis, grid->view());
+  ScatterRowsKernel<<<BlocksFor(32 * n), kThreads, 0, LaunchStream()>>>(rows, first, n,
+                                                                        field->view());
   CheckLaunch("scatter_rows");
 }
 
 #else
 
-void GatherRows(const DeviceGrid&, const int32_t*, int64_t, int64_t, float, float*,
+void GatherRows(const DeviceStyleField&, const int32_t*, int64_t, int64_t, float, float*,
                 const int32_t*) {
   DeviceWait("gather_rows");
 }
@@ -164,7 +169,9 @@ void AddViewPenalty(const Mat3f&, const float*, const float*, int64_t, float, fl
                     const int32_t*) {
   DeviceWait("add_view_penalty");
 }
-void ScatterRows(const float*, int64_t, int64_t, DeviceGrid*) { DeviceWait("scatter_rows"); }
+void ScatterRows(const float*, int64_t, int64_t, DeviceStyleField*) {
+  DeviceWait("scatter_rows");
+}
 
 #endif
 

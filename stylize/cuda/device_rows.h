@@ -1,10 +1,11 @@
 // What a network that restyles a field reads and writes of it on a CUDA device: a row a point
-// (see DeviceGridView).
+// (see DeviceGridView), or a splat.
 #pragma once
 
 #include <cstdint>
 
-#include "kernels/field/cuda/device_grid.h"
+#include "kernels/base/vec.h"
+#include "stylize/cuda/device_style_field.h"
 
 namespace regrade {
 
@@ -16,7 +17,7 @@ inline constexpr int kRowLanes =
 // stylize/field/lipschitz_network.h), zeros. points [n], or null for first, first + 1, ...
 // `counted`, here and below, lies on the device: if it is not null, n is no more than room, and
 // *counted of the rows are meant.
-void GatherRows(const DeviceGrid& grid, const int32_t* points, int64_t first, int64_t n,
+void GatherRows(const DeviceStyleField& field, const int32_t* points, int64_t first, int64_t n,
                 float position_scale, float* rows, const int32_t* counted = nullptr);
 // rows += (matrix (x) I_9) from, and `constant` on each channel's first coefficient. [n,
 // kRowLanes]
@@ -29,6 +30,6 @@ void AddViewPenalty(const Mat3f& matrix, const float* from, const float* rows, i
                     float view_weight, float* d_rows, double* loss,
                     const int32_t* counted = nullptr);
 // The field's own colours from rows [n, kRowLanes] of points first, first + 1, ...
-void ScatterRows(const float* rows, int64_t first, int64_t n, DeviceGrid* grid);
+void ScatterRows(const float* rows, int64_t first, int64_t n, DeviceStyleField* field);
 
 }  // namespace regrade

@@ -5,6 +5,7 @@
 
 #include "kernels/base/error.h"
 #include "kernels/network/cuda/device_mlp.h"
+#include "stylize/cuda/device_batches.h"
 #include "stylize/cuda/device_color_loss.h"
 #include "stylize/cuda/device_ray_weights.h"
 #include "stylize/field/base_map.h"
@@ -33,13 +34,13 @@ void Reserve(int64_t size, const char* what, DeviceBuffer<T>* buffer) {
 
 class DeviceStyleLoss : public StyleLoss {
  public:
-  DeviceStyleLoss(const DeviceGrid* grid, const AggregationOptions& options)
-      : grid_(*grid),
+  DeviceStyleLoss(const DeviceStyleField* field, const AggregationOptions& options)
+      : field_(*field),
         options_(options),
-        touched_(*grid),
-        slots_(*grid),
+        touched_(field->grid),
+        slots_(field->grid),
         sums_(1, "sums of a loss") {
-    REGRADE_CHECK(!grid->fitting);
+    REGRADE_CHECK(!field->grid.fitting);
     sums_.Zero();
   }
 
@@ -61,7 +62,7 @@ class DeviceStyleLoss : public StyleLoss {
     ForEachBand([&](int64_t begin, int64_t) {
       BlendBand(begin);
       if (gradient != nullptr)
-        BlendColorsAdjoint(grid_, weights_, slots_, rays_.data() + begin, unclamped_.data(),
+        BlendColorsAdjoint(field_, weights_, slots_, rays_.data() + begin, unclamped_.data(),
                            d_color_.data(), d_rows_.data(), exact_rows_.data());
     });
     if (gradient != nullptr) {
@@ -74,8 +75,9 @@ class DeviceStyleLoss : public StyleLoss {
     result.rays = static_cast<int64_t>(sums.rays);
     result.squared_error = sums.squared_error;
     if (result.rays == 0) return result;
-    const double count = options_.divide_by_voxels ? static_cast<double>(grid_.num_voxels())
-                                                   : 3.0 * static_cast<double>(result.rays);
+    const double count = options_.divide_by_voxels
+                             ? static_cast<double>(field_.grid.num_voxels())
+                             : 3.0 * static_cast<double>(result.rays);
     result.loss = sums.loss / count;
     if (gradient == nullptr) return result;
     mlp_->AddAdjoint(precision, features_.data(), d_rows_.data(), slots_.num_slots);
@@ -119,7 +121,7 @@ class DeviceStyleLoss : public StyleLoss {
     for (int half = 0; half < kMlpHidden; half += kRowLanes) {
       Forward(HiddenUnits(network, half), MlpPrecision::kSplit);
       ForEachBand([&](int64_t begin, int64_t count) {
-        BlendRows(grid_, weights_, slots_, rows_.data(), of_rays.data(),
+        BlendRows(field_, weights_, slots_, rows_.data(), of_rays.data(),
                   Exact(count * kRowLanes, &exact_sums_));
         of_rays.CopyOut(band.data() + begin * kRowLanes, count * kRowLanes);
       });
@@ -133,6 +135,7 @@ class DeviceStyleLoss : public StyleLoss {
  private:
   // Which voxels the rays touch, and their features.
   AggregationResult Touch(const LipschitzNetwork& network, const StyleRays& batch) {
+    batch_ = &batch;
     num_rays_ = static_cast<int64_t>(batch.rays.size());
     Reserve(num_rays_, "rays", &rays_);
     Reserve(num_rays_, "colours of rays", &targets_);
@@ -148,7 +151,7 @@ class DeviceStyleLoss : public StyleLoss {
     result.touched_voxels = slots_.num_slots;
     Reserve(slots_.num_slots * kRowLanes, "features of touched voxels", &features_);
     Reserve(slots_.num_slots * kRowLanes, "styled voxels", &rows_);
-    GatherRows(grid_, slots_.point_of_slot.data(), 0, slots_.num_slots,
+    GatherRows(field_, slots_.point_of_slot.data(), 0, slots_.num_slots,
                network.data().position_scale, features_.data());
     return result;
   }
@@ -163,8 +166,16 @@ class DeviceStyleLoss : public StyleLoss {
   }
 
   void March(int64_t begin, DeviceTouched* touched) {
-    weights_.March(grid_, rays_.data() + begin, std::min(kBandRays, num_rays_ - begin),
-                   options_.march, options_.min_weight, touched);
+    const int64_t n = std::min(kBandRays, num_rays_ - begin);
+    if (field_.splats == nullptr) {
+      weights_.March(field_.grid, rays_.data() + begin, n, options_.march, options_.min_weight,
+                     touched);
+      return;
+    }
+    field_.splats->Weigh({{batch_, begin, begin + n}}, n, options_.min_weight, &weighed_);
+    weights_.Reserve(n, weighed_.most);
+    TakeSamples(weighed_, nullptr, &weights_, touched);
+    weights_.num_samples = weighed_.most;
   }
 
   // body(first ray, rays) with weights_ of each band; a single one has been marched already.
@@ -187,19 +198,21 @@ class DeviceStyleLoss : public StyleLoss {
     Reserve(weights_.num_rays, "colours of rays", &color_);
     Reserve(weights_.num_rays, "gradients of colours", &d_color_);
     Reserve(weights_.num_samples, "clamps of samples", &unclamped_);
-    BlendColors(grid_, weights_, slots_, rays_.data() + begin, rows_.data(), color_.data(),
+    BlendColors(field_, weights_, slots_, rays_.data() + begin, rows_.data(), color_.data(),
                 unclamped_.data(), Exact(3 * weights_.num_rays, &exact_sums_));
     AddColorLoss(color_.data(), targets_.data() + begin, weights_.transmittance.data(),
                  weights_.num_rays, {options_.max_transmittance, options_.one_sided},
                  d_color_.data(), sums_.data());
   }
 
-  const DeviceGrid& grid_;
+  const DeviceStyleField& field_;
   AggregationOptions options_;
   DeviceTouched touched_;
   DeviceSlots slots_;
   DeviceRayWeights weights_;
+  DeviceSplatSamples weighed_;
   std::unique_ptr<DeviceMlp> mlp_;
+  const StyleRays* batch_ = nullptr;  // of the call under way
   int64_t num_rays_ = 0;
   DeviceBuffer<Ray> rays_;
   DeviceBuffer<Vec3f> targets_, color_, d_color_;
@@ -211,31 +224,31 @@ class DeviceStyleLoss : public StyleLoss {
 
 }  // namespace
 
-std::unique_ptr<StyleLoss> MakeDeviceStyleLoss(const DeviceGrid* grid,
+std::unique_ptr<StyleLoss> MakeDeviceStyleLoss(const DeviceStyleField* field,
                                                const AggregationOptions& options) {
-  return std::make_unique<DeviceStyleLoss>(grid, options);
+  return std::make_unique<DeviceStyleLoss>(field, options);
 }
 
-void RestyleOnDevice(const LipschitzNetwork& network, DeviceGrid* grid) {
-  REGRADE_CHECK(!grid->fitting);
+void RestyleOnDevice(const LipschitzNetwork& network, DeviceStyleField* field) {
+  const DeviceGrid& grid = field->grid;
+  REGRADE_CHECK(!grid.fitting);
   const DeviceRange range("restyling the field");
   constexpr int64_t kChunk = 1 << 20;  // points; 256 MiB of features and results
-  const int64_t room =
-      std::min(std::max(grid->num_voxels(), grid->spheres.num_texels()), kChunk);
+  const int64_t room = std::min(std::max(grid.num_voxels(), grid.spheres.num_texels()), kChunk);
   DeviceBuffer<float> features(room * kRowLanes, "features of voxels");
   DeviceBuffer<float> rows(room * kRowLanes, "styled voxels");
   const DeviceMlp mlp(MakeFusedMlp(network.Effective<float>()));
   const auto restyle = [&](int64_t first, int64_t end) {
     for (int64_t begin = first; begin < end; begin += kChunk) {
       const int64_t count = std::min(kChunk, end - begin);
-      GatherRows(*grid, nullptr, begin, count, network.data().position_scale, features.data());
+      GatherRows(*field, nullptr, begin, count, network.data().position_scale, features.data());
       mlp.Forward(MlpPrecision::kSplit, features.data(), count, rows.data());
       AddBaseMap(network.data(), features.data(), count, rows.data());
-      ScatterRows(rows.data(), begin, count, grid);
+      ScatterRows(rows.data(), begin, count, field);
     }
   };
-  restyle(0, grid->num_voxels());
-  if (grid->spheres.on()) restyle(grid->first_texel(), grid->num_points());
+  restyle(0, grid.num_voxels());
+  if (grid.spheres.on()) restyle(grid.first_texel(), grid.num_points());
   DeviceWait("restyling the field");
 }
 

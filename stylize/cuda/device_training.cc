@@ -37,19 +37,19 @@ TrainingParams ParamsOf(const DeviceGrid& grid, const AggregationOptions& option
 
 class DeviceTraining::CapturedSteps {
  public:
-  CapturedSteps(const DeviceGrid* grid, const AggregationOptions& options,
+  CapturedSteps(const DeviceStyleField* field, const AggregationOptions& options,
                 const WeightUpdate& update, const LipschitzNetwork& network,
                 int64_t rays_per_step, int64_t most_steps)
-      : grid_(*grid),
+      : field_(*field),
         options_(options),
         position_scale_(network.data().position_scale),
         has_base_(network.data().has_base),
         base_(BaseOf(network.data())),
         batches_(rays_per_step, most_steps),
-        touched_(*grid),
-        slots_(*grid),
+        touched_(field->grid),
+        slots_(field->grid),
         mlp_(MakeFusedMlp(network.Effective<float>())),
-        optimizer_(LayerShapes(), ParamsOf(*grid, options, update, network.data()), mlp_),
+        optimizer_(LayerShapes(), ParamsOf(field->grid, options, update, network.data()), mlp_),
         rays_(rays_per_step, "rays"),
         targets_(rays_per_step, "colours of rays"),
         color_(rays_per_step, "colours of rays"),
@@ -59,7 +59,7 @@ class DeviceTraining::CapturedSteps {
         demand_(1, "buffer sizes that a step needed"),
         stats_(most_steps, "statistics of steps") {
     stats_.Zero();
-    REGRADE_CHECK(!grid->fitting && !options.every_voxel);
+    REGRADE_CHECK(!field->grid.fitting && !options.every_voxel);
     REGRADE_CHECK(rays_per_step > 0 && rays_per_step <= kMostRays);
   }
 
@@ -73,6 +73,7 @@ class DeviceTraining::CapturedSteps {
     optimizer_.CopyIn(network.data().parameters, network.data().singular_vectors, adam, first,
                       rejected_in_a_row_);
     demand_.Zero();
+    if (field_.splats != nullptr) WeighSplats(batches);
     if (sample_capacity_ == 0) GrowBuffers(batches.front());
     Launch(begun_);
   }
@@ -104,7 +105,7 @@ class DeviceTraining::CapturedSteps {
       if (i + 1 < state.step) continue;
       steps.last = {step.loss, step.squared_error, static_cast<int64_t>(step.rays),
                     step.touched, step.samples};
-      const double voxels = LossDivisor(grid_, options_);
+      const double voxels = LossDivisor(field_.grid, options_);
       const double divisor = voxels > 0 ? voxels : 3.0 * static_cast<double>(step.rays);
       steps.last.loss = step.rays > 0 ? step.loss / divisor : 0;
     }
@@ -115,7 +116,7 @@ class DeviceTraining::CapturedSteps {
 
   void SetCapacity(int64_t samples, int64_t slots) {
     sample_capacity_ = samples;
-    slot_capacity_ = std::min(slots, grid_.num_points());
+    slot_capacity_ = std::min(slots, field_.grid.num_points());
     weights_ = {};
     weights_.Reserve(rays_.size(), sample_capacity_);
     const int64_t floats = slot_capacity_ * kRowLanes;
@@ -138,12 +139,15 @@ class DeviceTraining::CapturedSteps {
   void Step() {
     const OptimizerState* state = optimizer_.state();
     TakeBatch(batches_, &state->step, rays_.data(), targets_.data());
-    weights_.Launch(grid_, rays_.data(), rays_.size(), options_.march, options_.min_weight,
-                    &touched_);
+    if (field_.splats != nullptr)
+      TakeSamples(weighed_, &state->step, &weights_, &touched_);
+    else
+      weights_.Launch(field_.grid, rays_.data(), rays_.size(), options_.march,
+                      options_.min_weight, &touched_);
     slots_.Launch(&touched_);
     ClampToCapacity(slot_capacity_, &weights_, &slots_, demand_.data());
     const int32_t* touched = slots_.counter.data();
-    GatherRows(grid_, slots_.point_of_slot.data(), 0, slot_capacity_, position_scale_,
+    GatherRows(field_, slots_.point_of_slot.data(), 0, slot_capacity_, position_scale_,
                features_.data(), touched);
     optimizer_.ActivateWeights(&mlp_, &demand_.data()->overflowed);
     mlp_.Forward(MlpPrecision::kTensor, features_.data(), slot_capacity_, rows_.data(),
@@ -153,12 +157,12 @@ class DeviceTraining::CapturedSteps {
                     rows_.data(), touched);
     (options_.exact_sums ? exact_rows_ : d_rows_).Zero();
     sums_.Zero();
-    BlendColors(grid_, weights_, slots_, rays_.data(), rows_.data(), color_.data(),
+    BlendColors(field_, weights_, slots_, rays_.data(), rows_.data(), color_.data(),
                 unclamped_.data(), exact_colors_.data());
     AddColorLoss(color_.data(), targets_.data(), weights_.transmittance.data(), rays_.size(),
                  {options_.max_transmittance, options_.one_sided}, d_color_.data(),
                  sums_.data());
-    BlendColorsAdjoint(grid_, weights_, slots_, rays_.data(), unclamped_.data(),
+    BlendColorsAdjoint(field_, weights_, slots_, rays_.data(), unclamped_.data(),
                        d_color_.data(), d_rows_.data(), exact_rows_.data());
     AddViewPenalty(base_.matrix, features_.data(), rows_.data(), slot_capacity_,
                    static_cast<float>(options_.view_weight), d_rows_.data(),
@@ -189,12 +193,33 @@ class DeviceTraining::CapturedSteps {
                  batches_.per_step * int64_t{sizeof(Vec3f)});
   }
 
+  // The samples of the steps that begin.
+  void WeighSplats(const std::vector<StyleRays>& batches) {
+    std::vector<DeviceSplatWeigher::Group> groups(static_cast<size_t>(batches_.steps),
+                                                  {nullptr, 0, 0});
+    for (int64_t i = 0; i < begun_; ++i) {
+      const StyleRays& batch = batches[static_cast<size_t>(i)];
+      groups[static_cast<size_t>((begun_from_ + i) % batches_.steps)] = {
+          &batch, 0, std::ssize(batch.rays)};
+    }
+    const int64_t before = weighed_.capacity;
+    field_.splats->Weigh(groups, batches_.per_step, options_.min_weight, &weighed_);
+    // A captured step reads where the samples were.
+    if (sample_capacity_ > 0 && weighed_.capacity != before)
+      SetCapacity(sample_capacity_, slot_capacity_);
+  }
+
   // Half as much again as a first batch needs.
   void GrowBuffers(const StyleRays& batch) {
-    rays_.CopyIn(batch.rays.data(), static_cast<int64_t>(batch.rays.size()));
     DeviceRayWeights trial;
-    trial.March(grid_, rays_.data(), static_cast<int64_t>(batch.rays.size()), options_.march,
-                options_.min_weight, &touched_);
+    if (field_.splats != nullptr) {
+      trial.Reserve(rays_.size(), weighed_.most);
+      TakeSamples(weighed_, &optimizer_.state()->step, &trial, &touched_);
+    } else {
+      rays_.CopyIn(batch.rays.data(), std::ssize(batch.rays));
+      trial.March(field_.grid, rays_.data(), std::ssize(batch.rays), options_.march,
+                  options_.min_weight, &touched_);
+    }
     slots_.Assign(&touched_);
     const int64_t samples = trial.num_samples, slots = slots_.num_slots;
     trial = {};
@@ -202,12 +227,13 @@ class DeviceTraining::CapturedSteps {
                 std::max<int64_t>(1024, slots + slots / 2));
   }
 
-  const DeviceGrid& grid_;
+  const DeviceStyleField& field_;
   AggregationOptions options_;
   float position_scale_;
   bool has_base_;
   RowMap base_;
   DeviceBatches batches_;
+  DeviceSplatSamples weighed_;  // of splats, a group for each step
   DeviceTouched touched_;
   DeviceSlots slots_;
   DeviceRayWeights weights_;
@@ -227,10 +253,10 @@ class DeviceTraining::CapturedSteps {
   DeviceGraph graph_;
 };
 
-DeviceTraining::DeviceTraining(const DeviceGrid* grid, const AggregationOptions& options,
+DeviceTraining::DeviceTraining(const DeviceStyleField* field, const AggregationOptions& options,
                                const WeightUpdate& update, const LipschitzNetwork& network,
                                int64_t rays_per_step, int64_t most_steps)
-    : steps_(std::make_unique<CapturedSteps>(grid, options, update, network, rays_per_step,
+    : steps_(std::make_unique<CapturedSteps>(field, options, update, network, rays_per_step,
                                              most_steps)) {}
 DeviceTraining::~DeviceTraining() = default;
 

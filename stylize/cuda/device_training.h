@@ -8,8 +8,8 @@
 #include <memory>
 #include <vector>
 
-#include "kernels/field/cuda/device_grid.h"
 #include "stylize/cuda/device_lipschitz.h"
+#include "stylize/cuda/device_style_field.h"
 #include "stylize/field/gradient_aggregation.h"
 #include "stylize/field/lipschitz_network.h"
 
@@ -18,7 +18,7 @@ namespace regrade {
 class DeviceTraining {
  public:
   // `most_steps`: of one call of Begin. Steps take rays_per_step rays, at most kMostRays.
-  DeviceTraining(const DeviceGrid* grid, const AggregationOptions& options,
+  DeviceTraining(const DeviceStyleField* field, const AggregationOptions& options,
                  const WeightUpdate& update, const LipschitzNetwork& network,
                  int64_t rays_per_step, int64_t most_steps);
   ~DeviceTraining();
@@ -26,7 +26,7 @@ class DeviceTraining {
   static constexpr int64_t kMostRays = 1 << 16;
 
   // Starts the steps first, first + 1, ... of these rays (fewer than rays_per_step are padded
-  // with rays that do not count). Does not wait; `batches` is not used after the call.
+  // with rays that do not count). Does not wait for them; `batches` is not used after the call.
   void Begin(int64_t first, const std::vector<StyleRays>& batches,
              const LipschitzNetwork& network, const AdamState& adam);
 

@@ -40,11 +40,14 @@ Vec3f SphereColor(const RadianceField& field, const WeightedSample& sample) {
 }  // namespace
 
 ColorMap LeastSquaresMap(const RadianceField& field, const StyleRays& batch,
-                         const AggregationOptions& options) {
+                         const AggregationOptions& options, RayWeigher* weigher) {
   const int64_t n = batch.size();
-  const RayWeights weights =
-      MakeRayWeigher(*field.geometry, field.near_clip, options.march, options.min_weight)
-          ->Weigh(batch);
+  std::unique_ptr<RayWeigher> own;
+  if (weigher == nullptr) {
+    own = MakeRayWeigher(*field.geometry, field.near_clip, options.march, options.min_weight);
+    weigher = own.get();
+  }
+  const RayWeights weights = weigher->Weigh(batch);
   const int basis = field.appearance.basis;
   std::vector<Vec3f> foreground(n);
 #pragma omp parallel for schedule(dynamic, 64)

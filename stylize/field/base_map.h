@@ -11,9 +11,9 @@ namespace regrade {
 //
 // With S_r = sum_i w_i c_i and O_r = 1 - T_r, a field mapped by (M, b) renders M S_r + b O_r +
 // T_r c_bg: EQ(least-squares-color-map) with opacities. Rays that `options` leaves out do not
-// count.
+// count. `weigher`, unless null, is the field's, with the least weight of `options`.
 ColorMap LeastSquaresMap(const RadianceField& field, const StyleRays& batch,
-                         const AggregationOptions& options);
+                         const AggregationOptions& options, RayWeigher* weigher = nullptr);
 
 // A network whose residual is exactly zero: the map alone, carried into coefficients.
 LipschitzNetwork NetworkOfMap(const ColorMap& map);

@@ -119,6 +119,7 @@ class GradientAggregation : public StyleLoss {
   AggregationResult Run(const LipschitzNetwork& network, const StyleRays& batch,
                         std::vector<double>* gradient) override;
   HiddenSums SumHidden(const LipschitzNetwork& network, const StyleRays& batch) override;
+  RayWeigher* weigher() { return weigher_.get(); }
 
  private:
   struct Band;

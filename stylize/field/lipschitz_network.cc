@@ -8,6 +8,7 @@
 #include "kernels/base/error.h"
 #include "kernels/field/background_spheres.h"
 #include "kernels/network/lipschitz_layer.h"
+#include "stylize/field/splat_position.h"
 #include "stylize/spectral_norm.h"
 
 namespace regrade {
@@ -231,16 +232,9 @@ std::vector<int32_t> VertexOfVoxel(const Geometry& geometry) {
 
 namespace {
 
-// In [-2, 2], see EQ(splat-position).
-Vec3f SplatPosition(const Geometry& geometry, int64_t splat) {
-  const GridFrame& box = geometry.frame;
-  Vec3f p;
-  float farthest = 0;
-  for (int a = 0; a < 3; ++a) {
-    p[a] = (geometry.splats.mean[3 * splat + a] - box.center[a]) / box.radius[a];
-    farthest = std::max(farthest, std::abs(p[a]));
-  }
-  return farthest <= 1 ? p : p / farthest * (2 - 1 / farthest);
+Vec3f PositionOfSplat(const Geometry& geometry, int64_t splat) {
+  const float* const mean = geometry.splats.mean.data() + 3 * splat;
+  return SplatPosition(geometry.frame, {mean[0], mean[1], mean[2]});
 }
 
 // [-1, 1] across the box.
@@ -266,7 +260,7 @@ void FillFeatures(const RadianceField& field, float position_scale, int64_t voxe
   for (int c = 0; c < 3; ++c) std::copy_n(sh + c * basis, basis, row + c * 9);
   const Geometry& geometry = *field.geometry;
   const Vec3f position =
-      geometry.splats.on() ? SplatPosition(geometry, voxel) : VoxelPosition(geometry, vertex);
+      geometry.splats.on() ? PositionOfSplat(geometry, voxel) : VoxelPosition(geometry, vertex);
   for (int a = 0; a < 3; ++a) row[kNetworkSh + a] = position_scale * position[a];
 }
 

@@ -123,8 +123,7 @@ std::vector<int32_t> VertexOfVoxel(const Geometry& geometry);
 // smaller basis are padded with zeros, which leaves the bound as it is. An adaptive field has
 // one frame for the positions of all levels, see EQ(cell-lattice): where two cells of different
 // levels share a vertex, it is one record, restyled once.
-// EQ(splat-position): of splats p = (mean - centre) / radius of the box, along each axis, and
-// where m = max |p_a| > 1, p (2 - 1 / m) / m: what lies far outside stays within [-2, 2].
+// Of splats see EQ(splat-position).
 void FillFeatures(const RadianceField& field, float position_scale, int64_t voxel,
                   int32_t vertex, float* row);
 

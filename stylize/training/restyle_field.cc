@@ -22,8 +22,6 @@ RestyledField Restyle(RadianceField field, const TrainingTargets& targets,
   };
   RestyledField result;
   const SceneColorMap scene_map = targets.SceneMap(&result.notices);
-  if (BackendForStyle(request.backend, field) != request.backend)
-    result.notices.push_back("the style of splats is trained on the CPU");
   field.appearance = PadShBasis(std::move(field.appearance), kStyledBasis);
   // A ray's colour behind the box is a colour of the scene, too.
   const Vec3f source_background = field.background;

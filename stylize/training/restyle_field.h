@@ -37,7 +37,7 @@ struct RestyledField {
   RadianceField source;  // with kStyledBasis
   RadianceField styled;
   TrainNetworkResult trained;
-  std::vector<std::string> notices;  // of the scene-wide map, and where training was
+  std::vector<std::string> notices;  // of the scene-wide map
 };
 
 // `targets` must not be empty. Throws what TrainNetwork throws, and Error(kResources) where

@@ -10,6 +10,7 @@
 #include "kernels/device/backend.h"
 #include "kernels/field/radiance_field.h"
 #include "kernels/optimize/adam.h"
+#include "kernels/render/ray_weigher.h"
 #include "stylize/field/gradient_aggregation.h"
 #include "stylize/field/lipschitz_network.h"
 #include "stylize/field/weight_update.h"
@@ -44,6 +45,8 @@ class StyleEngine {
   virtual ~StyleEngine() = default;
 
   virtual StyleLoss* loss() = 0;
+  // Of the field, with the loss's min_weight; not after Restyle.
+  virtual RayWeigher* weigher() = 0;
   virtual int steps_per_call() const = 0;  // largest size of StepRequest::batches
   // Power iteration, loss and gradient, UpdateWeights. `update` is the same in every call.
   virtual StepResult Step(const WeightUpdate& update, const StepRequest& request,
@@ -62,10 +65,6 @@ std::unique_ptr<StyleEngine> MakeCpuStyleEngine(const RadianceField* field,
 std::unique_ptr<StyleEngine> MakeCudaStyleEngine(const RadianceField* field,
                                                  const AggregationOptions& loss,
                                                  int64_t rays_per_step);
-
-// Where a field's style is trained if `asked` is: that of splats on the CPU, whatever renders
-// them.
-Backend BackendForStyle(Backend asked, const RadianceField& field);
 
 std::unique_ptr<StyleEngine> MakeStyleEngine(Backend backend, const RadianceField* field,
                                              const MarchOptions& march,

@@ -13,6 +13,7 @@ class CpuStyleEngine : public StyleEngine {
       : field_(*field), loss_(*field, loss) {}
 
   StyleLoss* loss() override { return &loss_; }
+  RayWeigher* weigher() override { return loss_.weigher(); }
   int steps_per_call() const override { return 1; }
   StepResult Step(const WeightUpdate& update, const StepRequest& request,
                   LipschitzNetwork* network, AdamState* adam) override {
@@ -57,15 +58,11 @@ std::unique_ptr<StyleEngine> MakeCpuStyleEngine(const RadianceField* field,
   return std::make_unique<CpuStyleEngine>(field, loss);
 }
 
-Backend BackendForStyle(Backend asked, const RadianceField& field) {
-  return field.geometry->splats.on() ? Backend::kCpu : asked;
-}
-
 std::unique_ptr<StyleEngine> MakeStyleEngine(Backend backend, const RadianceField* field,
                                              const MarchOptions& march,
                                              const TrainNetworkOptions& options) {
   const AggregationOptions loss = LossOptions(options, march);
-  if (BackendForStyle(backend, *field) == Backend::kCpu) return MakeCpuStyleEngine(field, loss);
+  if (backend == Backend::kCpu) return MakeCpuStyleEngine(field, loss);
   return MakeCudaStyleEngine(field, loss, RaysPerStep(options.rays_per_step, options.patch));
 }
 

@@ -2,11 +2,13 @@
 // run there without the host; otherwise the device computes loss and gradient, and the host
 // updates the weights. Float sums have no fixed order, so two runs differ in the last bits
 // unless exact_sums is set.
+#include <memory>
 #include <utility>
 
 #include "kernels/base/error.h"
-#include "kernels/field/packed_grid.h"
+#include "kernels/render/device_ray_weigher.h"
 #include "stylize/cuda/device_style.h"
+#include "stylize/cuda/device_style_field.h"
 #include "stylize/cuda/device_training.h"
 #include "stylize/training/host_steps.h"
 #include "stylize/training/style_engine.h"
@@ -19,12 +21,19 @@ class CudaStyleEngine : public StyleEngine {
  public:
   CudaStyleEngine(const RadianceField* field, const AggregationOptions& loss,
                   int64_t rays_per_step)
-      : field_(UploadGrid(MakeFastGrid(*field))),
+      : field_(UploadStyleField(*field)),
         options_(loss),
         rays_per_step_(rays_per_step),
-        loss_(MakeDeviceStyleLoss(&field_, loss)) {}
+        loss_(MakeDeviceStyleLoss(&field_, loss)) {
+    if (field_.splats != nullptr)
+      weigher_ = std::make_unique<DeviceRayWeigher>(field_.splats.get(), loss.min_weight);
+    else
+      weigher_ =
+          MakeRayWeigher(*field->geometry, field->near_clip, loss.march, loss.min_weight);
+  }
 
   StyleLoss* loss() override { return loss_.get(); }
+  RayWeigher* weigher() override { return weigher_.get(); }
   int steps_per_call() const override { return OnDevice() ? kBoundEvery : 1; }
 
   StepResult Step(const WeightUpdate& update, const StepRequest& request,
@@ -56,7 +65,7 @@ class CudaStyleEngine : public StyleEngine {
     training_.reset();  // their memory is needed
     loss_.reset();
     RestyleOnDevice(network, &field_);
-    Appearance restyled = ToRadianceField(DownloadGrid(field_)).appearance;
+    Appearance restyled = DownloadAppearance(field_);
     if (Report(progress, 1, 1) == LoopControl::kStop) throw Interrupted();
     return restyled;
   }
@@ -67,10 +76,11 @@ class CudaStyleEngine : public StyleEngine {
            rays_per_step_ <= DeviceTraining::kMostRays;
   }
 
-  DeviceGrid field_;
+  DeviceStyleField field_;
   AggregationOptions options_;
   int64_t rays_per_step_;
   std::unique_ptr<StyleLoss> loss_;
+  std::unique_ptr<RayWeigher> weigher_;
   std::unique_ptr<DeviceTraining> training_;
   HostSteps host_;
 };

@@ -112,7 +112,8 @@ ColorMap Training::BetterMap(double* mse) {
   };
   if (options_.base != "least-squares") consider(scene_map_.map);
   if (options_.base == "mkl") return better;
-  const ColorMap least_squares = LeastSquaresMap(field_, sample_, loss_options_);
+  const ColorMap least_squares =
+      LeastSquaresMap(field_, sample_, loss_options_, engine_.weigher());
   if (options_.bound_factor <= 0 || options_.base == "least-squares" ||
       SpectralNorm(least_squares.matrix) <= options_.bound_factor * result_.k_est)
     consider(least_squares);

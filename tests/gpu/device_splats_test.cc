@@ -9,6 +9,7 @@
 #include <utility>
 #include <vector>
 
+#include "kernels/render/device_ray_weigher.h"
 #include "kernels/render/field_renderer.h"
 #include "kernels/splats/cpu/render_splats.h"
 #include "kernels/splats/cuda/device_splat_renderer.h"
@@ -16,6 +17,7 @@
 #include "tests/support/device_test.h"
 #include "tests/support/record_error.h"
 #include "tests/support/small_splats.h"
+#include "tests/support/splat_ball.h"
 
 namespace regrade {
 namespace {
@@ -274,6 +276,82 @@ TEST_F(DeviceSplatsTest, AFieldAndItsStyleAreRenderedAsOnTheHost) {
   }
   for (size_t i = 0; i < a.view.depth.pixels.size(); ++i)
     ASSERT_NEAR(a.view.depth.pixels[i], b.view.depth.pixels[i], 1e-3) << i;
+}
+
+// What rays see, in lists: the splats, their weights and directions. Both sides have the same
+// operations in float, fused on the device or not; a threshold that is a rounding away, and the
+// order of splats at one depth, may be decided otherwise.
+TEST_F(DeviceSplatsTest, RaysSeeWhatTheySeeOnTheCpu) {
+  const GridFrame box{{}, {0, 0, 0}, {1, 1, 1}};
+  constexpr float kLeast = 1e-3f;
+  int otherwise = 0, rays = 0;
+  for (const Scene& scene : Scenes())
+    for (const bool antialiased : {false, true}) {
+      if (scene.splats.count() == 0 || scene.name == "one depth") continue;
+      const RadianceField field = FieldOfSplats(scene.splats, box, 0.2f, antialiased);
+      const ViewRays pixels = testing::PixelsOf(
+          {SplatCameraOf(75, 50), SplatCameraOf(8, 8), SplatCameraOf(131, 97)});
+      const RayWeights exact =
+          MakeRayWeigher(*field.geometry, field.near_clip, {}, kLeast)->Weigh(pixels);
+      DeviceSplatWeigher weigher(SplatsOf(field), SplatOptionsOf(field), 1 << 30);
+      const RayWeights got = DeviceRayWeigher(&weigher, kLeast).Weigh(pixels);
+      ASSERT_EQ(got.num_rays(), exact.num_rays());
+      for (size_t r = 0; r < pixels.rays.size(); ++r) {
+        ++rays;
+        const int64_t a = got.first[r], b = exact.first[r], n = got.first[r + 1] - a;
+        bool same = n == exact.first[r + 1] - b;
+        double off = std::abs(got.transmittance[r] - exact.transmittance[r]), turned = 0;
+        for (int64_t i = 0; same && i < n; ++i) {
+          const size_t at = static_cast<size_t>(a + i), to = static_cast<size_t>(b + i);
+          same = got.samples[at].vertex == exact.samples[to].vertex;
+          off = std::max(
+              off, std::abs(double{got.samples[at].weight} - double{exact.samples[to].weight}));
+          turned = std::max(turned, double{Norm(got.directions[at] - exact.directions[to])});
+        }
+        if (!same || !(off <= 1e-5)) {
+          ++otherwise;
+          EXPECT_NEAR(got.transmittance[r], exact.transmittance[r], 2 / 255.0) << scene.name;
+          continue;
+        }
+        testing::RecordBound(scene.name + ": weights against the CPU", testing::Computed::kGpu,
+                             off, 1e-5);
+        EXPECT_LE(turned, 1e-6);
+      }
+    }
+  EXPECT_LE(otherwise, testing::RecordBound("rays decided otherwise", testing::Computed::kGpu,
+                                            otherwise, rays / 1000));
+}
+
+// Cameras that come again, whose lists were kept or not; rays in another order and in groups.
+TEST_F(DeviceSplatsTest, WeightsDoNotDependOnMemoryOrGroups) {
+  const RadianceField field = FieldOfSplats(CastSplats<float>(RandomSplats(3000, 4, 105)),
+                                            {{}, {0, 0, 0}, {1, 1, 1}}, 0.2f, false);
+  const ViewRays pixels =
+      testing::PixelsOf({SplatCameraOf(75, 50), SplatCameraOf(40, 30), SplatCameraOf(131, 97)});
+  std::vector<RayWeights> all;
+  for (const int64_t kept : {int64_t{0}, int64_t{20000}, int64_t{1} << 30}) {
+    DeviceSplatWeigher weigher(SplatsOf(field), SplatOptionsOf(field), kept);
+    for (int again = 0; again < 2; ++again)
+      all.push_back(DeviceRayWeigher(&weigher, 1e-3f).Weigh(pixels));
+    DeviceSplatSamples samples;
+    const int64_t n = pixels.size(), third = n / 3;
+    weigher.Weigh({{&pixels, 2 * third, n}, {nullptr, 0, 0}, {&pixels, 0, third}}, third + 2,
+                  1e-3f, &samples);
+    std::vector<int32_t> count(3);
+    samples.count.CopyOut(count.data(), 3);
+    const RayWeights& one = all.front();
+    EXPECT_EQ(count[0], one.first.back() - one.first[static_cast<size_t>(2 * third)]);
+    EXPECT_EQ(count[1], 0);
+    EXPECT_EQ(count[2], one.first[static_cast<size_t>(third)]);
+  }
+  for (const RayWeights& weights : all) {
+    ASSERT_EQ(weights.first, all.front().first);
+    ASSERT_EQ(weights.transmittance, all.front().transmittance);
+    for (size_t i = 0; i < weights.samples.size(); ++i) {
+      ASSERT_EQ(weights.samples[i].vertex, all.front().samples[i].vertex);
+      ASSERT_EQ(weights.samples[i].weight, all.front().samples[i].weight);
+    }
+  }
 }
 
 // Splats in larger arrays than they need, as a fit that adds some has them.

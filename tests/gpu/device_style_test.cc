@@ -16,6 +16,7 @@
 #include "tests/support/device_test.h"
 #include "tests/support/parity_row.h"
 #include "tests/support/small_field.h"
+#include "tests/support/splat_ball.h"
 #include "tests/support/styled_ball.h"
 
 namespace regrade {
@@ -131,12 +132,14 @@ TEST_F(DeviceStyle, MlpLessThanATile) { CheckMlp(1); }
 TEST_F(DeviceStyle, MlpNoWholeTiles) { CheckMlp(37); }
 TEST_F(DeviceStyle, LargeMlpOfTwoChunks) { CheckMlp(70001); }
 
-enum class Scene { kBall, kBallBeforeLayers, kCells };
-constexpr const char* kSceneNames[] = {"", ", layers", ", cells"};
+enum class Scene { kBall, kBallBeforeLayers, kCells, kSplats };
+constexpr const char* kSceneNames[] = {"", ", layers", ", cells", ", splats"};
 
-// A ball of n voxels a side, one in front of background layers, or cells of three sizes.
+// A ball of n voxels a side, one in front of background layers, cells of three sizes, or a ball
+// of n^3 / 2 splats.
 RadianceField FieldOf(Scene scene, int n, int basis) {
   if (scene == Scene::kCells) return RandomCellField({4, 4, 4}, 2, basis, 81);
+  if (scene == Scene::kSplats) return SplatBall(int64_t{n} * n * n / 2, 0.4f, basis);
   RadianceField field = Ball(n, basis);
   if (scene == Scene::kBallBeforeLayers) AddSpheres(40, 9, 0.7, 5, &field);
   return field;
@@ -147,7 +150,7 @@ RadianceField FieldOf(Scene scene, int n, int basis) {
 void CheckLossAndGradient(int side, Scene scene) {
   for (const int basis : {9, 4, 1}) {
     const RadianceField field = FieldOf(scene, 14, basis);
-    const DeviceGrid grid = UploadGrid(MakeFastGrid(field));
+    const DeviceStyleField on_card = UploadStyleField(field);
     LipschitzNetwork network = RandomNetwork(91);
     network.data().has_base = true;
     network.data().base = SomeMap();
@@ -160,7 +163,7 @@ void CheckLossAndGradient(int side, Scene scene) {
                                        .view_weight = 0.7,
                                        .every_voxel = every_voxel};
       GradientAggregation on_cpu(field, options);
-      const std::unique_ptr<StyleLoss> on_device = MakeDeviceStyleLoss(&grid, options);
+      const std::unique_ptr<StyleLoss> on_device = MakeDeviceStyleLoss(&on_card, options);
       const size_t size = static_cast<size_t>(LipschitzNetwork::NumParameters());
       std::vector<double> expected(size), gradient(size);
       const double should_be = on_cpu.Run(network, batch, nullptr).loss;
@@ -190,6 +193,10 @@ TEST_F(DeviceStyle, LossAndGradientBeforeLayers) {
   CheckLossAndGradient(13, Scene::kBallBeforeLayers);
 }
 TEST_F(DeviceStyle, LossAndGradientOfCells) { CheckLossAndGradient(13, Scene::kCells); }
+TEST_F(DeviceStyle, LossAndGradientOfSplats) { CheckLossAndGradient(13, Scene::kSplats); }
+TEST_F(DeviceStyle, LargeLossAndGradientOfTwoBandsOfSplats) {
+  CheckLossAndGradient(150, Scene::kSplats);
+}
 TEST_F(DeviceStyle, LargeLossAndGradientOfTwoBands) { CheckLossAndGradient(150, Scene::kBall); }
 TEST_F(DeviceStyle, LargeLossAndGradientOfTwoBandsBeforeLayers) {
   CheckLossAndGradient(150, Scene::kBallBeforeLayers);
@@ -200,7 +207,7 @@ TEST_F(DeviceStyle, LargeLossAndGradientOfTwoBandsBeforeLayers) {
 // 1e-3 each, and few do.
 void CheckExactSums(int side, Scene scene) {
   const RadianceField field = FieldOf(scene, 40, 9);
-  const DeviceGrid grid = UploadGrid(MakeFastGrid(field));
+  const DeviceStyleField on_card = UploadStyleField(field);
   const LipschitzNetwork network = RandomNetwork(33);
   StyleRays batch = SomeRays(3, side);
   struct Run {
@@ -213,10 +220,11 @@ void CheckExactSums(int side, Scene scene) {
   for (Run& run : runs) {
     const AggregationOptions options{
         .min_weight = 1e-4f, .view_weight = 0.7, .exact_sums = &run != &runs[2]};
-    const std::unique_ptr<StyleLoss> loss = MakeDeviceStyleLoss(&grid, options);
+    const std::unique_ptr<StyleLoss> loss = MakeDeviceStyleLoss(&on_card, options);
     run.result = loss->Run(network, batch, &run.gradient);
     run.sums = loss->SumHidden(network, batch);
     std::reverse(batch.rays.begin(), batch.rays.end());
+    std::reverse(batch.places.begin(), batch.places.end());
     std::reverse(batch.targets.begin(), batch.targets.end());
   }
   const auto& [one, other, floats] = runs;
@@ -242,18 +250,21 @@ TEST_F(DeviceStyle, H68_ExactSumsAreTheSameBitsInAnyOrder) { CheckExactSums(50, 
 TEST_F(DeviceStyle, H68_ExactSumsOfCellsAreTheSameBitsInAnyOrder) {
   CheckExactSums(50, Scene::kCells);
 }
+TEST_F(DeviceStyle, H68_ExactSumsOfSplatsAreTheSameBitsInAnyOrder) {
+  CheckExactSums(50, Scene::kSplats);
+}
 TEST_F(DeviceStyle, H68_LargeExactSumsAreTheSameBitsInAnyOrder) {
   CheckExactSums(150, Scene::kBallBeforeLayers);
 }
 
 void CheckHiddenSums(Scene scene) {
   const RadianceField field = FieldOf(scene, 12, 9);
-  const DeviceGrid grid = UploadGrid(MakeFastGrid(field));
+  const DeviceStyleField on_card = UploadStyleField(field);
   const StyleRays batch = SomeRays(2, 20);
   const LipschitzNetwork network = RandomNetwork(33);
   const AggregationOptions options{.max_transmittance = 0.5f};
   const auto should = GradientAggregation(field, options).SumHidden(network, batch);
-  const auto is = MakeDeviceStyleLoss(&grid, options)->SumHidden(network, batch);
+  const auto is = MakeDeviceStyleLoss(&on_card, options)->SumHidden(network, batch);
   ASSERT_EQ(is.hidden.size(), should.hidden.size());
   ASSERT_EQ(is.missing.size(), should.missing.size());
   double off = 0;
@@ -268,6 +279,7 @@ void CheckHiddenSums(Scene scene) {
 TEST_F(DeviceStyle, HiddenSums) { CheckHiddenSums(Scene::kBall); }
 TEST_F(DeviceStyle, HiddenSumsBeforeLayers) { CheckHiddenSums(Scene::kBallBeforeLayers); }
 TEST_F(DeviceStyle, HiddenSumsOfCells) { CheckHiddenSums(Scene::kCells); }
+TEST_F(DeviceStyle, HiddenSumsOfSplats) { CheckHiddenSums(Scene::kSplats); }
 
 void CheckRestyle(Scene scene) {
   for (const int basis : {9, 4, 1}) {
@@ -277,32 +289,31 @@ void CheckRestyle(Scene scene) {
     LipschitzNetwork network = RandomNetwork(92);
     network.data().has_base = true;
     network.data().base = SomeMap();
-    DeviceGrid grid = UploadGrid(MakeFastGrid(field));
-    RestyleOnDevice(network, &grid);
-    const FastGrid restyled = DownloadGrid(grid);
-    const Appearance should = ApplyNetwork(network, field);
+    DeviceStyleField on_card = UploadStyleField(field);
+    RestyleOnDevice(network, &on_card);
+    const Appearance is = DownloadAppearance(on_card), should = ApplyNetwork(network, field);
+    ASSERT_EQ(is.sh.size(), should.sh.size());
     double off = 0;
-    for (int64_t v = 0; v < restyled.num_voxels(); ++v) {
-      for (int k = 0; k < 3 * basis; ++k)
-        off = std::max(off, std::abs(double{restyled.records[v * restyled.lanes() + k]} -
-                                     should.sh[v * 3 * basis + k]));
-      ASSERT_EQ(restyled.records[v * restyled.lanes() + DensityLane(basis)],
-                field.geometry->density[v]);
-    }
-    ParityRow("restyled voxels", what, "CPU", off, 2e-5);
+    for (int64_t i = 0; i < is.sh.size(); ++i)
+      off = std::max(off, std::abs(double{is.sh[i]} - should.sh[i]));
+    ParityRow("restyled records", what, "CPU", off, 2e-5);
+    ASSERT_EQ(is.sphere_color.size(), should.sphere_color.size());
     double layers_off = 0;
-    for (int64_t t = 0; t < restyled.spheres.num_texels(); ++t) {
-      for (int c = 0; c < 3; ++c)
-        layers_off = std::max(layers_off, std::abs(double{restyled.spheres.texels[4 * t + c]} -
-                                                   should.sphere_color[3 * t + c]));
-      ASSERT_EQ(restyled.spheres.texels[4 * t + 3], field.geometry->spheres.density[t]);
-    }
+    for (int64_t i = 0; i < is.sphere_color.size(); ++i)
+      layers_off =
+          std::max(layers_off, std::abs(double{is.sphere_color[i]} - should.sphere_color[i]));
     ParityRow("restyled layers", what, "CPU", layers_off, 2e-5);
+    if (scene == Scene::kSplats) continue;
+    const RadianceField restyled = ToRadianceField(DownloadGrid(on_card.grid));
+    ASSERT_TRUE(std::ranges::equal(restyled.geometry->density, field.geometry->density));
+    ASSERT_TRUE(std::ranges::equal(restyled.geometry->spheres.density,
+                                   field.geometry->spheres.density));
   }
 }
 
 TEST_F(DeviceStyle, Restyle) { CheckRestyle(Scene::kBallBeforeLayers); }
 TEST_F(DeviceStyle, RestyleOfCells) { CheckRestyle(Scene::kCells); }
+TEST_F(DeviceStyle, RestyleOfSplats) { CheckRestyle(Scene::kSplats); }
 
 }  // namespace
 }  // namespace regrade

@@ -11,9 +11,11 @@
 
 #include "stylize/cuda/device_style.h"
 #include "stylize/training/host_steps.h"
+#include "stylize/training/restyle_field.h"
 #include "tests/support/device_test.h"
 #include "tests/support/parity_row.h"
 #include "tests/support/small_field.h"
+#include "tests/support/splat_ball.h"
 #include "tests/support/styled_ball.h"
 
 namespace regrade {
@@ -66,15 +68,17 @@ class DeviceStyleTraining : public testing::DeviceTest {
     }
     return std::sqrt(off / moved);
   }
+  static void CheckSteps(const RadianceField& field, const char* name);
+  static void CheckBuffers(const RadianceField& field);
+  // Of the way that weights went, which is what is compared of two trainings: Adam divides a
+  // gradient by its own size, so where a gradient is little more than rounding the two ways may
+  // step to opposite sides.
+  static constexpr double kOff = 5e-2;
 };
 
-// Adam divides a gradient by its own size, so where a gradient is little more than rounding the
-// two ways may step to opposite sides: what is compared is the whole way that the weights went.
-TEST_F(DeviceStyleTraining, StepsAreThoseOfTheHost) {
-  RadianceField field = Ball(14, 9);
-  AddSpheres(40, 9, 0.7, 5, &field);
-  const DeviceGrid grid = UploadGrid(MakeFastGrid(field));
-  const std::unique_ptr<StyleLoss> loss = MakeDeviceStyleLoss(&grid, Options());
+void DeviceStyleTraining::CheckSteps(const RadianceField& field, const char* name) {
+  const DeviceStyleField on_card = UploadStyleField(field);
+  const std::unique_ptr<StyleLoss> loss = MakeDeviceStyleLoss(&on_card, Options());
   for (const double limit : {std::numeric_limits<double>::infinity(), 1e-3}) {
     for (const int steps : {1, 12}) {
       WeightUpdate update = Update(12);
@@ -92,7 +96,7 @@ TEST_F(DeviceStyleTraining, StepsAreThoseOfTheHost) {
                       loss.get(), &by_host, &host_adam)
                 .last;
       ASSERT_EQ(host_adam.steps, steps);
-      DeviceTraining training(&grid, Options(), update, by_device, kRays, 12);
+      DeviceTraining training(&on_card, Options(), update, by_device, kRays, 12);
       training.Begin(0, batches, by_device, device_adam);
       const DeviceTraining::Steps made = training.End(&by_device, &device_adam);
       EXPECT_EQ(made.made, steps);
@@ -101,7 +105,7 @@ TEST_F(DeviceStyleTraining, StepsAreThoseOfTheHost) {
       EXPECT_EQ(made.last.samples, host_result.samples);
       EXPECT_EQ(made.last.touched_voxels, host_result.touched_voxels);
       EXPECT_EQ(device_adam.steps, host_adam.steps);
-      const std::string what = std::to_string(steps) + " steps";
+      const std::string what = std::to_string(steps) + " steps" + name;
       ParityRow("training, last loss", what, "steps from the host, relative",
                 std::abs(made.last.loss - host_result.loss) / host_result.loss, 1e-4);
       ParityRow("training, first moments", what, "steps from the host, norms",
@@ -111,20 +115,28 @@ TEST_F(DeviceStyleTraining, StepsAreThoseOfTheHost) {
       ParityRow("training, weights", what, "steps from the host, of the path length",
                 Difference(by_device.data().parameters, by_host.data().parameters,
                            start.data().parameters),
-                5e-2);
+                kOff);
     }
   }
 }
 
-TEST_F(DeviceStyleTraining, BuffersGrowAndNoStepIsLost) {
-  const RadianceField field = Ball(14, 9);
-  const DeviceGrid grid = UploadGrid(MakeFastGrid(field));
+TEST_F(DeviceStyleTraining, StepsAreThoseOfTheHost) {
+  RadianceField field = Ball(14, 9);
+  AddSpheres(40, 9, 0.7, 5, &field);
+  CheckSteps(field, "");
+}
+TEST_F(DeviceStyleTraining, StepsOnSplatsAreThoseOfTheHost) {
+  CheckSteps(SplatBall(1500, 0.4f), ", splats");
+}
+
+void DeviceStyleTraining::CheckBuffers(const RadianceField& field) {
+  const DeviceStyleField on_card = UploadStyleField(field);
   const std::vector<StyleRays> batches = Batches(5);
   double loss[2];
   for (const bool little : {false, true}) {
     LipschitzNetwork network = Start();
     AdamState adam;
-    DeviceTraining training(&grid, Options(), Update(5), network, kRays, 5);
+    DeviceTraining training(&on_card, Options(), Update(5), network, kRays, 5);
     if (little) training.ForgetCapacity(64, 32);
     training.Begin(0, batches, network, adam);
     const DeviceTraining::Steps made = training.End(&network, &adam);
@@ -136,6 +148,44 @@ TEST_F(DeviceStyleTraining, BuffersGrowAndNoStepIsLost) {
   EXPECT_NEAR(loss[1] / loss[0], 1, 1e-4);
 }
 
+TEST_F(DeviceStyleTraining, BuffersGrowAndNoStepIsLost) { CheckBuffers(Ball(14, 9)); }
+TEST_F(DeviceStyleTraining, BuffersGrowAndNoStepOnSplatsIsLost) {
+  CheckBuffers(SplatBall(1500, 0.4f));
+}
+
+// From photos to styled splats. Where the weights have gone another way by kOff of its length,
+// the loss is another one by that part of what the way gained: its gradient times the way.
+TEST_F(DeviceStyleTraining, SplatsAreRestyledAsOnTheCpu) {
+  const StyledSplats ball(800, 6, 40, CurvedStyle);
+  TrainingTargets targets;
+  for (size_t v = 0; v < ball.views.size(); ++v)
+    targets.Add(ball.views[v], ball.photos[v], ball.targets[v], ball.masks[v]);
+  double loss[2] = {}, of_map[2] = {};
+  RestyledField restyled[2];
+  for (const bool on_card : {false, true}) {
+    RestyleRequest request{.backend = on_card ? Backend::kCuda : Backend::kCpu};
+    request.options.steps = 50;
+    request.options.rays_per_step = 512;
+    restyled[on_card] = Restyle(ball.field, targets, request, {});
+    const TrainNetworkResult& trained = restyled[on_card].trained;
+    EXPECT_EQ(trained.steps, 50);
+    loss[on_card] = std::pow(10, -trained.psnr_db / 10);
+    of_map[on_card] = std::pow(10, -trained.linear_map_psnr_db / 10);
+  }
+  ParityRow("map of splats", "800 splats", "CPU, relative", std::abs(of_map[1] / of_map[0] - 1),
+            2e-5);
+  ASSERT_LT(loss[0], 0.8 * of_map[0]);
+  ParityRow("training of splats, loss", "50 steps", "CPU, of what was gained",
+            std::abs(loss[1] - loss[0]) / (of_map[0] - loss[0]), kOff);
+  const Buffer<float>&is = restyled[1].styled.appearance.sh,
+        &should = restyled[0].styled.appearance.sh, &was = restyled[0].source.appearance.sh;
+  const auto values = [](const Buffer<float>& sh) {
+    return std::vector<float>(sh.begin(), sh.end());
+  };
+  ParityRow("splats restyled by a training", "50 steps", "CPU, of the change",
+            Difference(values(is), values(should), values(was)), kOff);
+}
+
 // Exact sums: training again, with buffers that are too small at first, and in two parts as
 // after an interruption gives the same bits. With float sums the runs differ in the last bits.
 TEST_F(DeviceStyleTraining, H68_ExactSumsGiveTheSameBits) {
@@ -143,7 +193,7 @@ TEST_F(DeviceStyleTraining, H68_ExactSumsGiveTheSameBits) {
   constexpr int64_t kLarge = int64_t{kViews} * kLargeSide * kLargeSide;
   RadianceField field = Ball(72, 9);
   AddSpheres(40, 24, 0.7, 5, &field);
-  const DeviceGrid grid = UploadGrid(MakeFastGrid(field));
+  const DeviceStyleField on_card = UploadStyleField(field);
   const std::vector<StyleRays> batches = Batches(kSteps, kLargeSide);
   struct Trained {
     LipschitzNetwork network = Start();
@@ -153,7 +203,7 @@ TEST_F(DeviceStyleTraining, H68_ExactSumsGiveTheSameBits) {
   const auto train = [&](bool exact, bool little, int parts) {
     Trained trained;
     for (int part = 0; part < parts; ++part) {
-      DeviceTraining training(&grid, Options(exact), Update(kSteps), trained.network, kLarge,
+      DeviceTraining training(&on_card, Options(exact), Update(kSteps), trained.network, kLarge,
                               kSteps);
       if (little) training.ForgetCapacity(64, 32);
       const int size = kSteps / parts, first = part * size;
@@ -188,21 +238,21 @@ TEST_F(DeviceStyleTraining, H68_ExactSumsGiveTheSameBits) {
             "float sums, of the path length",
             Difference(one.network.data().parameters, floats.network.data().parameters,
                        Start().data().parameters),
-            5e-2);  // as above: Adam
+            kOff);
 }
 
 // A target that is not finite leaves the loss; weights that are not finite stop it, also where
 // two calls share the two steps.
 TEST_F(DeviceStyleTraining, TwoConsecutiveNonFiniteStepsStop) {
   const RadianceField field = Ball(14, 9);
-  const DeviceGrid grid = UploadGrid(MakeFastGrid(field));
+  const DeviceStyleField on_card = UploadStyleField(field);
   std::vector<StyleRays> batches = Batches(4);
   batches[1].targets[7].x = std::nanf("");
   batches[2].rays.resize(100);  // fewer are filled up
   batches[2].targets.resize(100);
   LipschitzNetwork network = Start();
   AdamState adam;
-  DeviceTraining training(&grid, Options(), Update(40), network, kRays, 4);
+  DeviceTraining training(&on_card, Options(), Update(40), network, kRays, 4);
   training.Begin(0, batches, network, adam);
   DeviceTraining::Steps made = training.End(&network, &adam);
   EXPECT_EQ(made.made, 4);

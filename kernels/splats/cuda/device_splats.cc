@@ -30,17 +30,17 @@ void DeviceSplats::Reserve(int64_t new_capacity) {
   });
 }
 
-void DeviceSplats::Upload(const Splats& splats) {
-  if (splats.basis != basis) *this = DeviceSplats(splats.count(), splats.basis);
+void DeviceSplats::Upload(const SplatsView<float>& splats) {
+  if (splats.basis != basis) *this = DeviceSplats(splats.count, splats.basis);
   count = 0;
-  Reserve(splats.count());
-  count = splats.count();
+  Reserve(splats.count);
+  count = splats.count;
   background = splats.background;
-  mean.CopyIn(splats.mean.data(), 3 * count);
-  log_scale.CopyIn(splats.log_scale.data(), 3 * count);
-  quaternion.CopyIn(splats.quaternion.data(), 4 * count);
-  opacity_logit.CopyIn(splats.opacity_logit.data(), count);
-  sh.CopyIn(splats.sh.data(), 3 * basis * count);
+  mean.CopyIn(splats.mean, 3 * count);
+  log_scale.CopyIn(splats.log_scale, 3 * count);
+  quaternion.CopyIn(splats.quaternion, 4 * count);
+  opacity_logit.CopyIn(splats.opacity_logit, count);
+  sh.CopyIn(splats.sh, 3 * basis * count);
 }
 
 Splats DeviceSplats::Download() const {

@@ -21,8 +21,9 @@ struct DeviceSplats {
   int64_t capacity() const { return opacity_logit.size(); }
   // Room for at least `capacity` splats; keeps the values. Throws Error(kResources).
   void Reserve(int64_t capacity);
-  // Replaces all splats, and the basis.
-  void Upload(const Splats& splats);
+  // Replaces all splats, and the basis; 0 has no coefficients.
+  void Upload(const SplatsView<float>& splats);
+  void Upload(const Splats& splats) { Upload(splats.view()); }
   Splats Download() const;
   // Sets all values of the `count` splats to 0.
   void Zero();

@@ -77,6 +77,7 @@ void SeeSplatsOnDevice(const SplatsView<float>& splats, const SplatCamera& camer
   const unsigned blocks = static_cast<unsigned>((splats.count + kBlock - 1) / kBlock);
   See<<<blocks, kBlock, 0, LaunchStream()>>>(splats, camera, options, grid, seen);
   CheckLaunch("see_splats");
+  if (splats.basis == 0) return;
   BySplatBasis(splats.basis, [&](auto basis) {
     Color<basis()><<<SeenList<kBlock>::Blocks(splats.count), kBlock, 0, LaunchStream()>>>(
         splats, camera.center, seen);

@@ -1,4 +1,4 @@
-// The splats that a camera sees, on the device.
+// The splats that a camera sees, on the device. Of a view of basis 0 records have no colours.
 #pragma once
 
 #include "kernels/device/device_memory.h"

@@ -105,6 +105,11 @@ __global__ void FindRanges(const Key* key, int64_t entries, int32_t* first, int3
   }
 }
 
+__global__ void CopySplatsKernel(const TileEntry* entry, int64_t entries, int32_t* splat) {
+  const int64_t e = Thread();
+  if (e < entries) splat[e] = entry[e].splat;
+}
+
 int BitsOf(int64_t values) {
   int bits = 1;
   while (int64_t{1} << bits < values) ++bits;
@@ -191,9 +196,17 @@ void TileLists::Make(const SeenSplats& seen, int64_t count, const TileGrid& grid
   view_.entry = entries.Current();
 }
 
+void TileLists::CopySplats(int32_t* splat) const {
+  if (num_entries_ == 0) return;
+  CopySplatsKernel<<<BlocksFor(num_entries_), kThreads, 0, LaunchStream()>>>(
+      view_.entry, num_entries_, splat);
+  CheckLaunch("copy_splats");
+}
+
 #else
 
 void TileLists::Make(const SeenSplats&, int64_t, const TileGrid&) { DeviceWait("splats"); }
+void TileLists::CopySplats(int32_t*) const { DeviceWait("splats"); }
 
 #endif
 

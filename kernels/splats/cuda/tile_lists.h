@@ -32,6 +32,9 @@ class TileLists {
 
   int64_t num_entries() const { return num_entries_; }
   TileListsView view() const { return view_; }
+  // Writes the entries' splats alone, splat [num_entries()].
+  void CopySplats(int32_t* splat) const;
+
   // [splats] The least slot of a splat; undefined for splats without tiles.
   const int32_t* first_slot() const { return first_slot_.data(); }
   // [splats] Splats in the order of their slots, those without tiles last.

@@ -1,0 +1,23 @@
+// Rays weighed on a CUDA device, in lists on the host; for splats, see DeviceSplatWeigher.
+#pragma once
+
+#include "kernels/render/ray_weigher.h"
+#include "kernels/splats/cuda/device_splat_weigher.h"
+
+namespace regrade {
+
+class DeviceRayWeigher : public RayWeigher {
+ public:
+  // `weigher` must outlive it. Samples that weigh at most min_weight are dropped.
+  DeviceRayWeigher(DeviceSplatWeigher* weigher, float min_weight)
+      : weigher_(*weigher), min_weight_(min_weight) {}
+
+  using RayWeigher::Weigh;
+  RayWeights Weigh(const ViewRays& rays, int64_t begin, int64_t end) override;
+
+ private:
+  DeviceSplatWeigher& weigher_;
+  float min_weight_;
+};
+
+}  // namespace regrade
