@@ -99,9 +99,10 @@ TEST(Retouch, TheSceneFollowsEachEditAsItsExactTruth) {
       "reconstruct", folder / "s/truth", "--out", folder / "out", "--device",
       "cpu",         "--holdout",        "0"};
   for (const std::string flag :
-       {"--photo-size", "192", "--splat-steps", "1200", "--splats", "10", "--style-steps",
-        "200", "--film-seconds", "0.125", "--fps", "24", "--film-size", "64", "--threads", "2",
-        "--tracks", "given"})
+       {"--photo-size", "192",  "--field",       "voxels", "--fit-resolutions", "96",
+        "--fit-steps",  "1200", "--style-steps", "200",    "--film-seconds",    "0.125",
+        "--fps",        "24",   "--film-size",   "64",     "--threads",         "2",
+        "--tracks",     "given"})
     reconstruct.push_back(flag);
   ProgramOutcome outcome = Regrade(reconstruct);
   ASSERT_EQ(outcome.code, 0) << outcome.text;
