@@ -143,7 +143,7 @@ double SplatSeconds(const SplatFitOptions& options, int64_t photo_pixels, int64_
 StagePlan PlanSplatFit(const SplatFitOptions& options, int64_t photo_pixels, int64_t photos,
                        int threads) {
   constexpr double kEntries = 6, kEntryBytes = 12 + 48, kSeenBytes = 100, kPhotoBytes = 12 + 8,
-                   kOfPixel = 150e-9, kOfSplat = 900e-9;
+                   kOfPixel = 500e-9, kOfSplat = 400e-9;
   const double splats = 1000.0 * double{options.thousands};
   const double bytes =
       splats * (SplatStateBytes(options) + kSeenBytes + kEntries * kEntryBytes);

@@ -231,7 +231,7 @@ TEST(KeepExposure, WhatFramesAreComparedWithHasTheirExposures) {
        "--gaps",     "1",
        "--strength", "0.1",
        "--page",     "off"},
-      testing::TinyFlags());
+      testing::TinyFlags("voxels"));
   const auto metrics = [&folder] {
     const JsonValue report = ReadJsonFile(folder / "o/styles/style_sunset/report.json");
     std::map<std::string, double> found;
