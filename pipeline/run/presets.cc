@@ -39,7 +39,7 @@ struct SplatEffort {
 };
 
 const SplatEffort kSplatEfforts[] = {
-    {"smoke", false, 150, 5},      {"draft", false, 1300, 40},  {"standard", false, 1400, 60},
+    {"smoke", false, 150, 5},      {"draft", false, 1300, 40},  {"standard", false, 1900, 80},
     {"best", false, 4000, 250},    {"smoke", true, 300, 10},    {"draft", true, 4000, 200},
     {"standard", true, 7500, 500}, {"best", true, 10000, 1000},
 };
