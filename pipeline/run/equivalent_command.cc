@@ -2,6 +2,7 @@
 
 #include "pipeline/program/device_choice.h"
 #include "pipeline/run/presets.h"
+#include "pipeline/run/resolve_settings.h"
 
 namespace regrade {
 namespace {
@@ -45,9 +46,7 @@ std::vector<std::string> EquivalentCommand(const RunContext& context) {
   if (preset != RunSettings().run.preset) words.insert(words.end(), {"--preset", preset});
   const JsonValue values = context.options.Values();
   // The flags of another kind of field are refused.
-  const JsonValue unused = context.settings.scene.UsesSplats()
-                               ? OptionValues(context.settings.fit)
-                               : OptionValues(context.settings.splats);
+  const JsonValue unused = OptionsOfOtherFit(context.settings.scene.field);
   for (const auto& [name, value] : values.AsObject()) {
     if (name == "preset" || start.Find(name) != nullptr || program.Find(name) != nullptr ||
         unused.Find(name) != nullptr)

@@ -78,19 +78,19 @@ void ApplyField(const std::string& field, OptionSet* options) {
     ApplyKnown(FieldValues(field), "--fit-field", options);
 }
 
-// Refuses flags of a kind of field that the run does not fit.
+// Refuses flags of a kind of field that the run does not fit. Without photos, --field is
+// another option.
 void RefuseFlagsOfOtherField(const OptionSet& options) {
   const JsonValue values = options.Values();
   const JsonValue* const field = values.Find("field");
   if (field == nullptr || values.Find("photo-size") == nullptr) return;
-  const bool splats = field->AsString() == "splats";
-  const JsonValue others =
-      splats ? OptionValues(FitOptions()) : OptionValues(SplatFitOptions());
+  const std::string& own = field->AsString();
+  const JsonValue others = OptionsOfOtherFit(own);
   for (const auto& [name, value] : others.AsObject())
     if (options.Given(name))
       throw UsageError(
-          "this run fits " + field->AsString(), "--" + name,
-          std::string("leave it out, or add --field ") + (splats ? "voxels" : "splats"));
+          "this run fits " + own, "--" + name,
+          Concat("leave it out, or add --field ", own == "splats" ? "voxels" : "splats"));
 }
 
 // What the flags say, or else the defaults; false for a command without --device.
@@ -151,6 +151,10 @@ void ApplyRunFile(const RunFile& file, const std::string& path,
 }
 
 }  // namespace
+
+JsonValue OptionsOfOtherFit(const std::string& field) {
+  return field == "splats" ? OptionValues(FitOptions()) : OptionValues(SplatFitOptions());
+}
 
 std::vector<std::string> ResolveSettings(const SettingsSources& sources, OptionSet* options) {
   std::vector<std::string> words;
