@@ -29,8 +29,10 @@ FastSpheres MakeFastSpheres(const RadianceField& field);
 void ToSphereGeometry(const FastSpheres& spheres, SphereGeometry* geometry,
                       Buffer<float>* color);
 
-// Lanes of a record for a basis of 1, 4 or 9.
-constexpr int RecordLanes(int basis) { return basis == 9 ? 32 : basis == 4 ? 16 : 4; }
+// Lanes of a record. Of splats with 16 harmonics there is no density.
+constexpr int RecordLanes(int basis) {
+  return basis == 16 ? 48 : basis == 9 ? 32 : basis == 4 ? 16 : 4;
+}
 constexpr int DensityLane(int basis) { return 3 * basis; }
 
 // Empty-space distances are stored per brick of cells: the smaller map stays in the cache, and

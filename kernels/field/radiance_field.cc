@@ -6,6 +6,7 @@
 
 #include "kernels/base/error.h"
 #include "kernels/field/cell_checks.h"
+#include "kernels/field/spherical_harmonics.h"
 
 namespace regrade {
 namespace {
@@ -120,8 +121,10 @@ void Validate(const RadianceField& field, const char* name) {
     Refuse(name, std::to_string(geometry.links.size()) + " links for a grid of " +
                      std::to_string(geometry.frame.NumVertices()) + " vertices");
   const int basis = field.appearance.basis;
-  if (basis != 1 && basis != 4 && basis != 9)
-    Refuse(name, std::to_string(basis) + " harmonics a channel; 1, 4 or 9 are supported");
+  if (!IsBasis(basis))
+    Refuse(name, Concat(basis, " harmonics a channel; 1, 4, 9 or 16 are supported"));
+  if (!geometry.splats.on() && basis > kMaxVoxelBasis)
+    Refuse(name, Concat(basis, " harmonics a channel; of voxels 1, 4 or 9 are supported"));
   const int64_t expected = geometry.num_voxels() * field.appearance.stride();
   if (field.appearance.sh.size() != expected)
     Refuse(name, std::to_string(field.appearance.sh.size()) + " colour coefficients, " +

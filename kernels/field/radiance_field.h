@@ -57,7 +57,7 @@ struct Geometry {
 };
 
 struct Appearance {
-  int basis = 9;               // spherical harmonics per channel: 1, 4 or 9
+  int basis = 9;               // spherical harmonics per channel: 1, 4 or 9; of splats 16, too
   Buffer<float> sh;            // [N, 3, basis]: channel-major, R then G then B
   Buffer<float> sphere_color;  // [columns, L, 3]: of degree 0; empty without spheres
 

@@ -10,8 +10,8 @@
 
 namespace regrade {
 
-inline constexpr int kMaxBasis = 9;                  // of a field
-inline constexpr int kMaxSplatBasis = 16;            // of splats
+inline constexpr int kMaxBasis = 16;
+inline constexpr int kMaxVoxelBasis = 9;             // records of voxels have no room for more
 inline constexpr double kSh0 = 0.28209479177387814;  // 1 / (2 sqrt(pi))
 inline constexpr double kSh1 = 0.4886025119029199;
 inline constexpr double kSh2a = 1.0925484305920792, kSh2b = 0.31539156525252005,
@@ -23,7 +23,11 @@ inline constexpr double kSh3a = 0.5900435899266435, kSh3b = 2.890611442640554,
 // Degree 0, 1, 2, 3 have 1, 4, 9, 16 functions.
 HD constexpr int BasisOfDegree(int degree) { return (degree + 1) * (degree + 1); }
 
-// gamma [basis]; `basis` is 1, 4 or 9; `d` has unit length (a length s would scale band l by
+constexpr bool IsBasis(int basis) {
+  return basis == 1 || basis == 4 || basis == 9 || basis == kMaxBasis;
+}
+
+// gamma [basis]; see IsBasis; `d` has unit length (a length s would scale band l by
 // s^l).
 template <typename T>
 HD REGRADE_ALWAYS_INLINE void ShBasis(int basis, const Vec3<T>& d, T* gamma) {
@@ -38,12 +42,6 @@ HD REGRADE_ALWAYS_INLINE void ShBasis(int basis, const Vec3<T>& d, T* gamma) {
   gamma[6] = T(kSh2b) * (T(2) * d.z * d.z - d.x * d.x - d.y * d.y);
   gamma[7] = T(-kSh2a) * d.x * d.z;
   gamma[8] = T(kSh2c) * (d.x * d.x - d.y * d.y);
-}
-
-// As ShBasis, with 16 functions, too.
-template <typename T>
-HD REGRADE_ALWAYS_INLINE void ShBasisTo3(int basis, const Vec3<T>& d, T* gamma) {
-  ShBasis(basis, d, gamma);
   if (basis <= 9) return;
   const T xx = d.x * d.x, yy = d.y * d.y, zz = d.z * d.z;
   gamma[9] = T(-kSh3a) * d.y * (T(3) * xx - yy);
@@ -58,7 +56,7 @@ HD REGRADE_ALWAYS_INLINE void ShBasisTo3(int basis, const Vec3<T>& d, T* gamma) 
 // The gradient by d of sum_k d_gamma_k Gamma_k(d), of the polynomials in x, y and z as free
 // variables.
 template <typename T>
-HD Vec3<T> ShBasisTo3Adjoint(int basis, const Vec3<T>& d, const T* d_gamma) {
+HD Vec3<T> ShBasisAdjoint(int basis, const Vec3<T>& d, const T* d_gamma) {
   Vec3<T> g{};
   if (basis <= 1) return g;
   const T* const k = d_gamma;

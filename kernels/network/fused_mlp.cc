@@ -66,7 +66,7 @@ int64_t FusedMlp::Offset(size_t layer) const {
 int64_t FusedMlp::NumParameters() const { return Offset(layers.size()); }
 
 int64_t FusedMlp::WorkspaceSize() const {
-  int64_t lanes = kMlpEndLanes + 2 * kMlpHidden + 1;
+  int64_t lanes = ends + 2 * kMlpHidden + 1;
   for (const Layer& layer : layers) lanes += 2 * layer.inputs;
   return kMlpBlock * lanes;  // the last one is a row of zeros
 }
@@ -84,11 +84,13 @@ FusedMlp MakeFusedMlp(const DenseNetwork<float>& network) {
   FusedMlp mlp;
   mlp.activation = network.activation;
   mlp.omega = network.omega;
+  mlp.ends =
+      MlpEndLanes(std::max(network.layers.front().inputs, network.layers.back().outputs));
   for (size_t l = 0; l < network.layers.size(); ++l) {
     const DenseLayer<float>& dense = network.layers[l];
     FusedMlp::Layer layer;
-    layer.inputs = l == 0 ? kMlpEndLanes : kMlpHidden;
-    layer.outputs = l + 1 == network.layers.size() ? kMlpEndLanes : kMlpHidden;
+    layer.inputs = l == 0 ? mlp.ends : kMlpHidden;
+    layer.outputs = l + 1 == network.layers.size() ? mlp.ends : kMlpHidden;
     REGRADE_CHECK_LE(dense.inputs, layer.inputs);
     REGRADE_CHECK_LE(dense.outputs, layer.outputs);
     // A padded hidden neuron would feed act(0) to the next layer and receive bias gradients.
@@ -118,8 +120,8 @@ void FusedForward(const FusedMlp& mlp, const float* input, int64_t n, float* out
 #pragma omp for schedule(dynamic, 1)
     for (int64_t t = 0; t < tasks; ++t) {
       const int64_t begin = t * kRowsPerTask;
-      functions->forward(mlp, input + begin * kMlpEndLanes, std::min(kRowsPerTask, n - begin),
-                         output + begin * kMlpEndLanes, workspace.data());
+      functions->forward(mlp, input + begin * mlp.ends, std::min(kRowsPerTask, n - begin),
+                         output + begin * mlp.ends, workspace.data());
     }
   }
 }
@@ -136,7 +138,7 @@ void FusedAdjoint(const FusedMlp& mlp, const float* input, const float* d_output
     for (int g = 0; g < kGroups; ++g) {
       const int64_t begin = n * g / kGroups, end = n * (g + 1) / kGroups;
       if (begin < end)
-        functions->adjoint(mlp, input + begin * kMlpEndLanes, d_output + begin * kMlpEndLanes,
+        functions->adjoint(mlp, input + begin * mlp.ends, d_output + begin * mlp.ends,
                            end - begin, partials.data() + g * size, workspace.data());
     }
   }

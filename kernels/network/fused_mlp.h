@@ -1,7 +1,7 @@
 // The CPU's fast path through a narrow network for many voxels: blocks of rows stay in the
 // caches for all layers, forward and back. Tests compare it with dense_layer.h.
 //
-// Rows are padded: inputs and outputs to kMlpEndLanes, hidden layers are kMlpHidden wide.
+// Rows are padded: inputs and outputs to FusedMlp::ends, hidden layers are kMlpHidden wide.
 // Padding weights and values are zero, so padding costs time and does not change results.
 #pragma once
 
@@ -9,13 +9,15 @@
 #include <vector>
 
 #include "kernels/base/buffer.h"
+#include "kernels/base/host_device.h"
 #include "kernels/network/activation.h"
 #include "kernels/network/dense_layer.h"
 
 namespace regrade {
 
-inline constexpr int kMlpEndLanes = 32;
 inline constexpr int kMlpHidden = 64;
+// Lanes of a row with so many values, at most 64.
+HD constexpr int MlpEndLanes(int values) { return values <= 32 ? 32 : 64; }
 inline constexpr int kMlpMaxLayers = 8;
 inline constexpr int kMlpBlock =
     96;  // voxels: six layers and their slopes are 250 KB, an L2 cache
@@ -30,6 +32,7 @@ struct FusedMlp {
   };
   Activation activation = Activation::kSine;
   float omega = 1;
+  int ends = 0;  // lanes of a row of inputs or outputs, see MlpEndLanes
   std::vector<Layer> layers;
 
   // Number of all padded weights and biases, and offset of layer l: weights first, then biases.
@@ -40,14 +43,14 @@ struct FusedMlp {
 };
 
 // The network must have at least two and at most kMlpMaxLayers layers, hidden ones kMlpHidden
-// wide, inputs and outputs of at most kMlpEndLanes.
+// wide, inputs and outputs of at most 64.
 FusedMlp MakeFusedMlp(const DenseNetwork<float>& network);
 
-// output [n, kMlpEndLanes] of input [n, kMlpEndLanes].
+// output [n, ends] of input [n, ends].
 void FusedForward(const FusedMlp& mlp, const float* input, int64_t n, float* output);
 
 // Adds to `gradient` (the unpadded shapes) the adjoint of FusedForward for d_output
-// [n, kMlpEndLanes]. The forward pass is recomputed block by block, so memory does not grow
+// [n, ends]. The forward pass is recomputed block by block, so memory does not grow
 // with n. Sums have a fixed order: the result does not depend on the number of threads.
 void FusedAdjoint(const FusedMlp& mlp, const float* input, const float* d_output, int64_t n,
                   DenseNetwork<double>* gradient);

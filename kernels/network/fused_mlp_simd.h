@@ -141,7 +141,7 @@ struct Workspace {
       memory += 2 * kBlock * mlp.layers[l].inputs;
     }
     output = memory;
-    d = output + kBlock * kMlpEndLanes;
+    d = output + kBlock * mlp.ends;
     d_next = d + kBlock * kMlpHidden;
     zero = d_next + kBlock * kMlpHidden;
     std::memset(zero, 0, sizeof(float) * kMlpHidden);
@@ -150,9 +150,8 @@ struct Workspace {
 
 void ForwardBlock(const FusedMlp& mlp, const float* input, int rows, bool slopes,
                   const Workspace& work) {
-  std::memcpy(work.input[0], input, sizeof(float) * rows * kMlpEndLanes);
-  std::memset(work.input[0] + rows * kMlpEndLanes, 0,
-              sizeof(float) * (kBlock - rows) * kMlpEndLanes);
+  std::memcpy(work.input[0], input, sizeof(float) * rows * mlp.ends);
+  std::memset(work.input[0] + rows * mlp.ends, 0, sizeof(float) * (kBlock - rows) * mlp.ends);
   for (size_t l = 0; l < mlp.layers.size(); ++l) {
     const FusedMlp::Layer& layer = mlp.layers[l];
     const bool last = l + 1 == mlp.layers.size();
@@ -173,9 +172,8 @@ void Forward(const FusedMlp& mlp, const float* input, int64_t n, float* output, 
   const Workspace work(mlp, memory);
   for (int64_t begin = 0; begin < n; begin += kBlock) {
     const int rows = BlockRows(begin, n);
-    ForwardBlock(mlp, input + begin * kMlpEndLanes, rows, false, work);
-    std::memcpy(output + begin * kMlpEndLanes, work.output,
-                sizeof(float) * rows * kMlpEndLanes);
+    ForwardBlock(mlp, input + begin * mlp.ends, rows, false, work);
+    std::memcpy(output + begin * mlp.ends, work.output, sizeof(float) * rows * mlp.ends);
   }
 }
 
@@ -197,11 +195,11 @@ void Adjoint(const FusedMlp& mlp, const float* input, const float* d_output, int
   const Workspace work(mlp, memory);
   for (int64_t begin = 0; begin < n; begin += kBlock) {
     const int rows = BlockRows(begin, n);
-    ForwardBlock(mlp, input + begin * kMlpEndLanes, rows, true, work);
+    ForwardBlock(mlp, input + begin * mlp.ends, rows, true, work);
     float* d = work.d;
     float* d_next = work.d_next;
-    std::memcpy(d, d_output + begin * kMlpEndLanes, sizeof(float) * rows * kMlpEndLanes);
-    std::memset(d + rows * kMlpEndLanes, 0, sizeof(float) * (kBlock - rows) * kMlpEndLanes);
+    std::memcpy(d, d_output + begin * mlp.ends, sizeof(float) * rows * mlp.ends);
+    std::memset(d + rows * mlp.ends, 0, sizeof(float) * (kBlock - rows) * mlp.ends);
     for (size_t l = mlp.layers.size(); l-- > 0;) {
       const FusedMlp::Layer& layer = mlp.layers[l];
       AddLayerGradient(layer, work.input[l], d, partial + mlp.Offset(l));

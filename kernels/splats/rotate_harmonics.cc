@@ -18,11 +18,11 @@ HarmonicsMatrix RotateHarmonics(const Mat3d& rotation) {
     for (int k = 0; k < kAround; ++k) {
       const double across = std::sqrt(1 - root[i] * root[i]), angle = 2 * M_PI * k / kAround;
       const Vec3d direction{across * std::cos(angle), across * std::sin(angle), root[i]};
-      double to[kMaxSplatBasis], from[kMaxSplatBasis];
-      ShBasisTo3(kMaxSplatBasis, direction, to);
-      ShBasisTo3(kMaxSplatBasis, back * direction, from);
-      for (size_t a = 0; a < kMaxSplatBasis; ++a)
-        for (size_t b = 0; b < kMaxSplatBasis; ++b)
+      double to[kMaxBasis], from[kMaxBasis];
+      ShBasis(kMaxBasis, direction, to);
+      ShBasis(kMaxBasis, back * direction, from);
+      for (size_t a = 0; a < kMaxBasis; ++a)
+        for (size_t b = 0; b < kMaxBasis; ++b)
           matrix[a][b] += weight[i] * 2 * M_PI / kAround * to[a] * from[b];
     }
   return matrix;

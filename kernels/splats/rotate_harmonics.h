@@ -14,7 +14,7 @@
 
 namespace regrade {
 
-using HarmonicsMatrix = std::array<std::array<double, kMaxSplatBasis>, kMaxSplatBasis>;
+using HarmonicsMatrix = std::array<std::array<double, kMaxBasis>, kMaxBasis>;
 
 // M of `rotation` R, for 16 coefficients; the first 1, 4 or 9 rows and columns are those of
 // lower degrees.

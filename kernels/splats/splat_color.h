@@ -27,8 +27,8 @@ HD SplatDirection<T> DirectionToMean(const Vec3d& center, const Vec3<T>& mean) {
 // sh [3, basis].
 template <typename T>
 HD Vec3<T> SplatColor(int basis, const T* sh, const Vec3<T>& direction) {
-  T gamma[kMaxSplatBasis];
-  ShBasisTo3(basis, direction, gamma);
+  T gamma[kMaxBasis];
+  ShBasis(basis, direction, gamma);
   Vec3<T> color;
   for (int c = 0; c < 3; ++c) {
     T sum = T(0.5);
@@ -43,8 +43,8 @@ template <typename T>
 HD void SplatColorAdjoint(int basis, const T* sh, const SplatDirection<T>& direction,
                           const Vec3<T>& color, const Vec3<T>& d_color, T* d_sh,
                           Vec3<T>* d_mean) {
-  T gamma[kMaxSplatBasis], d_gamma[kMaxSplatBasis] = {};
-  ShBasisTo3(basis, direction.unit, gamma);
+  T gamma[kMaxBasis], d_gamma[kMaxBasis] = {};
+  ShBasis(basis, direction.unit, gamma);
   for (int c = 0; c < 3; ++c) {
     if (!(color[c] > 0)) continue;
     for (int k = 0; k < basis; ++k) {
@@ -52,7 +52,7 @@ HD void SplatColorAdjoint(int basis, const T* sh, const SplatDirection<T>& direc
       d_gamma[k] += d_color[c] * sh[c * basis + k];
     }
   }
-  const Vec3<T> d = ShBasisTo3Adjoint(basis, direction.unit, d_gamma);
+  const Vec3<T> d = ShBasisAdjoint(basis, direction.unit, d_gamma);
   const Vec3<T> across = d - direction.unit * Dot(direction.unit, d);
   *d_mean += across * direction.inverse_distance;
 }

@@ -13,7 +13,7 @@ namespace {
 
 void Validate(const Splats& splats, const char* name) {
   const int basis = splats.basis;
-  if (basis != 1 && basis != 4 && basis != 9 && basis != 16)
+  if (!IsBasis(basis))
     Refuse(name, Concat(basis, " harmonics a channel; 1, 4, 9 or 16 are supported"));
   const size_t n = splats.opacity_logit.size();
   if (n > INT32_MAX) Refuse(name, Concat(n, " splats, at most ", INT32_MAX, " are supported"));

@@ -7,6 +7,7 @@
 #include "kernels/base/error.h"
 #include "kernels/base/half.h"
 #include "kernels/field/cell_checks.h"
+#include "kernels/field/spherical_harmonics.h"
 #include "kernels/scene/camera_checks.h"
 #include "pipeline/files/npz_file.h"
 
@@ -16,21 +17,27 @@ namespace {
 // The arrays of an adaptive field are unknown to readers of version 1, those of splats to
 // readers of version 2.
 constexpr int32_t kUniformVersion = 1, kCellsVersion = 2, kSplatsVersion = 3;
-constexpr int kStoredBasis = 9;
+// Colours have 9 columns a channel, as svox2 has them, or the 16 of splats of degree 3.
+constexpr int kLeastStored = 9;
 constexpr int64_t kSphericalHarmonics = 1;  // svox2's basis_type
 
 uint16_t StoredColour(float value) {
   return HalfFromFloat(std::clamp(value, -kMaxHalf, kMaxHalf));
 }
 
-// Colours of voxels [first, first + voxels) in half precision, 27 values each.
-void PackColours(const Appearance& appearance, int64_t first, int64_t voxels, uint16_t* to) {
-  std::fill_n(to, voxels * 3 * kStoredBasis, uint16_t{0});
+int StoredBasis(const Appearance& appearance) {
+  return std::max(appearance.basis, kLeastStored);
+}
+
+// Colours of records [first, first + count) in half precision, 3 x StoredBasis values each.
+void PackColours(const Appearance& appearance, int64_t first, int64_t count, uint16_t* to) {
+  const int stored = StoredBasis(appearance);
+  std::fill_n(to, count * 3 * stored, uint16_t{0});
 #pragma omp parallel for schedule(static)
-  for (int64_t i = 0; i < voxels; ++i)
+  for (int64_t i = 0; i < count; ++i)
     for (int channel = 0; channel < 3; ++channel)
       for (int k = 0; k < appearance.basis; ++k)
-        to[(i * 3 + channel) * kStoredBasis + k] =
+        to[(i * 3 + channel) * stored + k] =
             StoredColour(appearance.sh[((first + i) * 3 + channel) * appearance.basis + k]);
 }
 
@@ -222,10 +229,10 @@ void ReadValues(NpzReader* file, Geometry* geometry, Appearance* appearance) {
   const int64_t first = joined ? 1 : 0;
   if (colours.shape.size() != 2 ||
       (colours.type != ArrayType::kF16 && colours.type != ArrayType::kF32) ||
-      (colours.shape[1] != first + 27 && colours.shape[1] != first + 12 &&
-       colours.shape[1] != first + 3))
+      (colours.shape[1] - first) % 3 != 0 || colours.shape[1] > first + 3 * kMaxBasis ||
+      !IsBasis(static_cast<int>(colours.shape[1] - first) / 3))
     Refuse(file->path(), std::string("colours are ") + NameOf(colours.type) +
-                             colours.ShapeText() + "; 3, 12 or 27 columns are read");
+                             colours.ShapeText() + "; 3, 12, 27 or 48 columns are read");
   if (geometry->cells.on() && colours.shape[0] != geometry->cells.num_vertices())
     Refuse(file->path() + ": array '" + (joined ? "data" : "sh_data") + "'",
            std::to_string(colours.shape[0]) + " rows, but the cells have " +
@@ -237,7 +244,7 @@ void ReadValues(NpzReader* file, Geometry* geometry, Appearance* appearance) {
   appearance->basis =
       file->Has("regrade_basis") ? file->ReadScalar<int32_t>("regrade_basis") : stored;
   const int basis = appearance->basis;
-  if ((basis != 1 && basis != 4 && basis != 9) || basis > stored)
+  if (!IsBasis(basis) || basis > stored)
     Refuse(file->path(),
            Concat("regrade_basis is ", basis, " of ", stored, " stored harmonics"));
   appearance->sh = UnpackedColours(colours, first, stored, basis);
@@ -284,11 +291,11 @@ void WriteFieldFile(const std::string& path, const StoredField& stored) {
   }
   if (!geometry.splats.on()) file.Add("density_data", {voxels, 1}, geometry.density.data());
   file.AddFilled<uint16_t>(
-      "sh_data", {voxels, 3 * kStoredBasis},
+      "sh_data", {voxels, 3 * StoredBasis(field.appearance)},
       [&field](int64_t first, int64_t count, uint16_t* to) {
         PackColours(field.appearance, first, count, to);
       },
-      field.appearance.basis == kStoredBasis ? NpzPacking::kStore : NpzPacking::kDeflate);
+      field.appearance.basis >= kLeastStored ? NpzPacking::kStore : NpzPacking::kDeflate);
   file.AddScalar<int64_t>("basis_type", kSphericalHarmonics);
   file.AddScalar<int32_t>("regrade_version", geometry.splats.on() ? kSplatsVersion
                                              : cells.on()         ? kCellsVersion

@@ -4,7 +4,8 @@
 // svox2's: radius f32[3], center f32[3], links i32[X,Y,Z], density_data f32[N,1], sh_data
 // f16[N,27], basis_type i64 (1: spherical harmonics); with background spheres
 // background_links i32[2R,R], background_data f32[columns,L,4]. Colours of a lower degree are
-// padded with zeros to 9 harmonics a channel. Additional: regrade_version i32, regrade_basis
+// padded with zeros to 9 harmonics a channel; those of splats of degree 3 have 48 columns.
+// Additional: regrade_version i32, regrade_basis
 // i32, regrade_background f32[3], regrade_near_clip f32, regrade_step f32 (voxels),
 // regrade_field_from_world f64[13] (scale, rotation by rows, translation), regrade_ndc f64[2]
 // where the field is in normalised device coordinates (ndc.h).

@@ -5,12 +5,13 @@
 namespace regrade {
 namespace {
 
-constexpr uint32_t kVersion = 3;
+constexpr uint32_t kVersion = 4;
 
 // Lists the members once for both directions.
 template <typename Visitor, typename State>
 void Visit(Visitor* visit, State* state) {
   auto& network = state->network;
+  visit->Value(&network.basis);
   visit->Text(&network.activation);
   visit->Value(&network.omega);
   visit->Value(&network.sh_scale);

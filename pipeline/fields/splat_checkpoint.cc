@@ -68,9 +68,7 @@ std::optional<SplatFitState> UnpackSplatFitState(std::string_view bytes, std::st
   }
   VisitArrays(&state, [&](auto* array) { unpacker.Values(array); });
   const int basis = state.splats.basis;
-  if (!unpacker.at_end() || (basis != 1 && basis != 4 && basis != 9 && basis != 16) ||
-      state.step < 0)
-    return std::nullopt;
+  if (!unpacker.at_end() || !IsBasis(basis) || state.step < 0) return std::nullopt;
   for (Splats* splats : {&state.splats, &state.first_moment, &state.second_moment}) {
     splats->basis = basis;
     if (!Consistent(*splats, state.splats.opacity_logit.size(), basis)) return std::nullopt;

@@ -19,6 +19,7 @@
 #include "pipeline/files/text.h"
 #include "pipeline/images/image_file.h"
 #include "pipeline/page/check_page.h"
+#include "pipeline/page/color_code.h"
 #include "pipeline/page/keyframes.h"
 #include "pipeline/page/page_file.h"
 #include "pipeline/run/run_file.h"
@@ -69,7 +70,7 @@ RadianceField ExactStyle(const RadianceField& source, const StoredNetwork& netwo
   RadianceField padded = source;
   padded.appearance = PadShBasis(std::move(padded.appearance), kStyledBasis);
   RadianceField exact = padded;
-  exact.appearance = ApplyNetwork(network.network, source);
+  exact.appearance = ApplyNetwork(network.network, padded);
   exact.background = network.background;
   if (!layers.residual.color.empty()) AddResidual(layers.residual, &exact.appearance);
   return layers.weight.empty() ? exact : MixFields(padded, {&exact}, {1}, &layers.weight);
@@ -164,8 +165,10 @@ MadePage MakePage(const std::string& folder, const std::vector<std::string>& sty
   PageContent content;
   content.served = options.served;
   EncodeScene(stored.field, views, options, &content);
-  if (!options.check) stored.field.appearance = {};  // fields have gigabytes
   MadePage made;
+  if (stored.field.appearance.basis > kCodeHarmonics)
+    made.report.push_back("the page shows harmonics up to degree 2; higher ones are left out");
+  if (!options.check) stored.field.appearance = {};  // fields have gigabytes
   made.field = DecodeField(content.field);
   made.places = RecordsInPageOrder(content.field, *made.field.geometry);
   std::vector<Camera> checked;

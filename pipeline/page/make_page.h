@@ -42,7 +42,7 @@ struct MadePage {
   const char* records_name = "";         // see RecordsName
   int64_t coarse_bytes = 0;              // of what is shown first
   std::vector<int64_t> style_bytes;
-  std::vector<std::string> report;  // lines of --check
+  std::vector<std::string> report;  // what is left out, and the lines of --check
   RadianceField field;              // as the page has it
   PageVoxels places;                // its records, as the page orders them
 };

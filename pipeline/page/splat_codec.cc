@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "kernels/base/error.h"
+#include "kernels/field/pad_sh_basis.h"
 #include "kernels/splats/extent.h"
 #include "kernels/splats/splat_field.h"
 #include "pipeline/page/color_code.h"
@@ -90,24 +91,11 @@ void UnpackColors(const PageField& page, const Part& part, Appearance* appearanc
             appearance->basis, splat, appearance->sh.data());
 }
 
-// A picture of the page needs harmonics of degree 2 at most.
-RadianceField OfPagesDegree(const RadianceField& field) {
-  if (field.appearance.basis <= kCodeHarmonics) return field;
-  RadianceField lower = field;
-  const int basis = field.appearance.basis;
-  const int64_t rows = field.appearance.sh.size() / basis;
-  lower.appearance.basis = kCodeHarmonics;
-  lower.appearance.sh.Resize(rows * kCodeHarmonics);
-  for (int64_t row = 0; row < rows; ++row)
-    std::copy_n(field.appearance.sh.data() + row * basis, kCodeHarmonics,
-                lower.appearance.sh.data() + row * kCodeHarmonics);
-  return lower;
-}
-
 }  // namespace
 
 PageField EncodeSplats(const RadianceField& any, double step) {
-  const RadianceField field = OfPagesDegree(any);
+  RadianceField field = any;  // a page has harmonics of degree 2 at most
+  field.appearance = LimitShBasis(std::move(field.appearance), kCodeHarmonics);
   const SplatOrder order = OrderOfSplats(*field.geometry);
   if (order.splat.empty()) throw InputError("no splat of the field is seen", "field.npz");
   const GridFrame& frame = field.geometry->frame;

@@ -57,6 +57,34 @@ ColorCode RoundToWords(const Geometry& geometry, Buffer<float>* sh) {
   return code;
 }
 
+// The effective layers on the harmonics that a page has: of a network of degree 3 what it makes
+// of colours without the higher ones, which are not computed either. No steeper than all of it.
+DenseNetwork<float> OfPagesHarmonics(const LipschitzNetwork& network) {
+  DenseNetwork<float> dense = network.Effective<float>();
+  const int basis = network.row().basis;
+  if (basis == kStyledBasis) return dense;
+  const NetworkRow row{kStyledBasis};
+  const DenseLayer<float>&first = dense.layers.front(), &last = dense.layers.back();
+  // The place among all values of a row of value i of the page's.
+  const auto place = [&](int i) {
+    return i < row.sh() ? i / row.basis * basis + i % row.basis : i - row.sh() + 3 * basis;
+  };
+  DenseLayer<float> inputs(first.outputs, row.inputs()), outputs(row.sh(), last.inputs);
+  inputs.bias = first.bias;
+  for (int o = 0; o < inputs.outputs; ++o)
+    for (int i = 0; i < inputs.inputs; ++i)
+      inputs.weight[static_cast<size_t>(o) * inputs.inputs + i] =
+          first.weight[static_cast<size_t>(o) * first.inputs + place(i)];
+  for (int o = 0; o < outputs.outputs; ++o) {
+    outputs.bias[o] = last.bias[place(o)];
+    std::copy_n(last.weight.begin() + place(o) * last.inputs, last.inputs,
+                outputs.weight.begin() + o * last.inputs);
+  }
+  dense.layers.front() = std::move(inputs);
+  dense.layers.back() = std::move(outputs);
+  return dense;
+}
+
 JsonValue::Array ArrayOf(const std::vector<double>& values) {
   return {values.begin(), values.end()};
 }
@@ -70,7 +98,7 @@ PageStyle EncodeStyle(const StoredNetwork& stored, const RadianceField& page, do
 PageStyle EncodeStyle(const StoredNetwork& stored, const RadianceField& page, double strength,
                       const StyleLayers& layers, const PageVoxels& places) {
   const LipschitzNetworkData& data = stored.network.data();
-  DenseNetwork<float> dense = stored.network.Effective<float>();
+  DenseNetwork<float> dense = OfPagesHarmonics(stored.network);
   std::string halves;
   for (DenseLayer<float>& layer : dense.layers) {
     RoundToHalves(&layer.weight, &halves);
@@ -90,7 +118,8 @@ PageStyle EncodeStyle(const StoredNetwork& stored, const RadianceField& page, do
         FusedForward(fused, features, n, output);
         if (!data.has_base) return;
         for (int64_t r = 0; r < n; ++r)
-          AddBaseMap(data.base, features + r * kFeatureStride, output + r * kFeatureStride);
+          AddBaseMap(data.base, kStyledBasis, features + r * fused.ends,
+                     output + r * fused.ends);
       },
       data.position_scale, source);
   JsonValue residual;

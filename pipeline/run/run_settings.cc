@@ -109,9 +109,6 @@ void CheckSplats(const RunSettings& settings) {
     if (const auto effect = effects.find(name); effect != effects.end() && effect->second)
       throw UsageError("belongs to voxels", Concat("--effects ", name, "=on"),
                        "leave it out, or use --field voxels");
-  if (settings.splats.sh_degree > 2)
-    throw UsageError("styles know harmonics up to degree 2", "--splat-degree",
-                     "give 0, 1 or 2");
 }
 
 }  // namespace

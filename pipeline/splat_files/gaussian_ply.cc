@@ -73,7 +73,7 @@ GaussianLayout FindGaussians(const PlyHeader& header, const std::string& where) 
 }
 
 SplatRecord RecordOf(const PlyRows& rows, const GaussianLayout& layout) {
-  float v[kFirstHarmonic + 3 * kMaxSplatBasis];
+  float v[kFirstHarmonic + 3 * kMaxBasis];
   std::ranges::transform(layout.property, v, [&rows](size_t property) {
     return static_cast<float>(rows.Number(property));
   });

@@ -58,7 +58,7 @@ void SplatTurn::Apply(int basis, SplatRecord* record) const {
       quaternion_,
       {splat.quaternion[0], splat.quaternion[1], splat.quaternion[2], splat.quaternion[3]});
   std::copy(turned.begin(), turned.end(), splat.quaternion);
-  float sh[3 * kMaxSplatBasis];
+  float sh[3 * kMaxBasis];
   std::copy_n(record->sh, 3 * basis, sh);
   for (int channel = 0; channel < 3; ++channel)
     for (int degree = 1; BasisOfDegree(degree - 1) < basis; ++degree)

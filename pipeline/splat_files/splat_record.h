@@ -15,7 +15,7 @@ namespace regrade {
 
 struct SplatRecord {
   Splat<float> splat;
-  float sh[3 * kMaxSplatBasis]{};  // [3, basis]: all coefficients of red first
+  float sh[3 * kMaxBasis]{};  // [3, basis]: all coefficients of red first
 };
 
 // A logit beyond this is as good as this: sigmoid(-kMostLogit) is 2e-9.

@@ -227,7 +227,7 @@ bool LooksLikeSpz(std::string_view bytes) {
 SplatScene ReadSpz(std::string_view bytes, uint64_t budget, const std::string& where) {
   const Attributes attributes = ReadAttributes(bytes, budget, where);
   const Header& header = attributes.header;
-  const int basis = std::min(BasisOfDegree(header.degree), kMaxSplatBasis);
+  const int basis = std::min(BasisOfDegree(header.degree), kMaxBasis);
   std::vector<std::string> ignored;
   const SplatTurn turn(TurnOf(attributes, where, &ignored));
   SplatCollector collector(header.count, basis, bytes.size(), budget, where);

@@ -6,6 +6,7 @@
 #include "kernels/field/cuda/warp_shade.h"
 #include "stylize/cuda/device_ray_weights.h"
 #include "stylize/cuda/warp_item.h"
+#include "stylize/cuda/warp_row.h"
 #include "stylize/field/view_penalty.h"
 
 namespace regrade {
@@ -32,19 +33,22 @@ __device__ int32_t CornerPoint(const StyleFieldView& grid, const DeviceWeightedS
   return column < 0 ? -1 : grid.first_texel() + column * grid.spheres.layers + layer;
 }
 
-// What a warp knows of its sample: lane c * 9 + k stands for coefficient k of channel c, lane j
-// < 8 for corner j.
+// What a warp knows of its sample: lanes stand for values of a row, and lane j < 8 for corner
+// j.
+template <int kBasis>
 struct WarpSample {
+  using Row = WarpRow<kBasis>;
   DeviceWeightedSample sample;
   int lane;
   int32_t slot;  // of this lane's corner; -1 where nothing is stored
   float corner;  // its trilinear weight
-  float gamma;   // this lane's basis function along the ray, 0 beyond the field's own
+  // The basis functions along the ray of this lane's values, 0 beyond the field's own.
+  float gamma[Row::kParts] = {};
 
   // `rays`: null where gamma is not needed.
   __device__ WarpSample(const StyleFieldView& field, const DeviceWeightedSample& s,
                         const int32_t* slot_of_point, const Ray* rays)
-      : sample(s), lane(static_cast<int>(threadIdx.x & 31)), slot(-1), corner(0), gamma(0) {
+      : sample(s), lane(static_cast<int>(threadIdx.x & 31)), slot(-1), corner(0) {
     const bool splat = field.mean != nullptr;
     if (lane < 8) {
       const int32_t point = CornerPoint(field, sample, lane);
@@ -53,30 +57,39 @@ struct WarpSample {
     }
     if (rays == nullptr) return;
     const int basis = sample.vertex < 0 ? 1 : field.basis;  // spheres have plain colours
-    float all[kMaxBasis];
-    ShBasis(kMaxBasis, splat ? sample.fraction : rays[sample.ray].direction, all);
+    float all[kBasis];
+    ShBasis(kBasis, splat ? sample.fraction : rays[sample.ray].direction, all);
 #pragma unroll
-    for (int k = 0; k < kMaxBasis; ++k)
-      if (lane < 27 && lane % 9 == k && k < basis) gamma = all[k];
+    for (int part = 0; part < Row::kParts; ++part) {
+      const int at = lane + 32 * part;
+#pragma unroll
+      for (int k = 0; k < kBasis; ++k)
+        if (at < Row::kSh && at % kBasis == k && k < basis) gamma[part] = all[k];
+    }
   }
 
-  // This lane's value of the blended row.
-  __device__ float Blend(const float* rows) const {
-    float value = 0;
+  // This lane's values of the blended row.
+  __device__ void Blend(const float* rows, float (&value)[Row::kParts]) const {
+#pragma unroll
+    for (int part = 0; part < Row::kParts; ++part) value[part] = 0;
 #pragma unroll
     for (int k = 0; k < 8; ++k) {
       const int32_t at = __shfl_sync(kAllLanes, slot, k);
       const float w = __shfl_sync(kAllLanes, corner, k);
-      if (at >= 0) value += w * rows[int64_t{at} * kRowLanes + lane];
+      if (at < 0) continue;
+#pragma unroll
+      for (int part = 0; part < Row::kParts; ++part)
+        value[part] += w * rows[int64_t{at} * Row::kStride + lane + 32 * part];
     }
-    return value;
   }
 };
 
-// Value c * 9 + k in lane order; sums of a channel's nine lanes land on its first one.
+// Of values in lane order: sums of a channel's lanes land on its first one.
+template <int kBasis>
 __device__ float ChannelSums(float value, int lane) {
+  static_assert(kBasis == 9 || kBasis == 16);
   const float ninth = __shfl_down_sync(kAllLanes, value, 8);
-  if (lane % 9 == 0) value += ninth;
+  if (kBasis == 16 || lane % kBasis == 0) value += ninth;
   value += __shfl_down_sync(kAllLanes, value, 4);
   value += __shfl_down_sync(kAllLanes, value, 2);
   return value + __shfl_down_sync(kAllLanes, value, 1);
@@ -105,27 +118,37 @@ __global__ void AddBackgroundKernel(Vec3f background, const float* transmittance
   if (r < n) color[r] += background * transmittance[r];
 }
 
-template <bool kExact>
+template <int kBasis, bool kExact>
 __global__ void BlendColorsKernel(StyleFieldView field, const DeviceWeightedSample* samples,
                                   int64_t n, const int32_t* counted,
                                   const int32_t* slot_of_point, const Ray* rays,
                                   const float* rows, float* color, uint8_t* unclamped) {
   const int64_t i = ItemOfWarp(n, counted);
   if (i < 0) return;
-  const WarpSample warp(field, samples[i], slot_of_point, rays);
-  const float sum = ChannelSums(warp.Blend(rows) * warp.gamma, warp.lane);
-  const float value = 0.5f + sum;  // of a channel on its first lane
-  const bool first = warp.lane < 27 && warp.lane % 9 == 0;
-  if (first && value > 0)
-    AddTo<kExact>(color, int64_t{warp.sample.ray} * 3 + warp.lane / 9,
-                  warp.sample.weight * value);
-  const unsigned above = __ballot_sync(kAllLanes, first && value > 0);
-  if (warp.lane == 0)
-    unclamped[i] =
-        static_cast<uint8_t>((above & 1) | (above >> 9 & 1) << 1 | (above >> 18 & 1) << 2);
+  using Row = WarpRow<kBasis>;
+  const WarpSample<kBasis> warp(field, samples[i], slot_of_point, rays);
+  float blend[Row::kParts];
+  warp.Blend(rows, blend);
+  unsigned above[Row::kParts];
+#pragma unroll
+  for (int part = 0; part < Row::kParts; ++part) {
+    const int at = warp.lane + 32 * part;
+    const float sum = ChannelSums<kBasis>(blend[part] * warp.gamma[part], warp.lane);
+    const float value = 0.5f + sum;  // of a channel on its first lane
+    const bool first = at < Row::kSh && at % kBasis == 0;
+    if (first && value > 0)
+      AddTo<kExact>(color, int64_t{warp.sample.ray} * 3 + at / kBasis,
+                    warp.sample.weight * value);
+    above[part] = __ballot_sync(kAllLanes, first && value > 0);
+  }
+  if (warp.lane != 0) return;
+  unsigned bits = 0;
+#pragma unroll
+  for (int c = 0; c < 3; ++c) bits |= (above[c * kBasis / 32] >> c * kBasis % 32 & 1) << c;
+  unclamped[i] = static_cast<uint8_t>(bits);
 }
 
-template <bool kExact>
+template <int kBasis, bool kExact>
 __global__ void BlendColorsAdjointKernel(StyleFieldView field,
                                          const DeviceWeightedSample* samples, int64_t n,
                                          const int32_t* counted, const int32_t* slot_of_point,
@@ -137,40 +160,67 @@ __global__ void BlendColorsAdjointKernel(StyleFieldView field,
   if (bits == 0) return;
   const Vec3f d = d_color[samples[i].ray];
   if (d.x == 0 && d.y == 0 && d.z == 0) return;
-  const WarpSample warp(field, samples[i], slot_of_point, rays);
-  const bool is_mass = warp.lane >= kMassLane && warp.lane < kMassLane + 3;
-  const int c = is_mass ? warp.lane - kMassLane : warp.lane / 9;
-  float d_blend = 0;
-  if (c < 3 && (bits >> c & 1) != 0)
-    d_blend = warp.sample.weight *
-              (is_mass ? static_cast<float>(warp.sample.vertex >= 0) : d[c] * warp.gamma);
+  using Row = WarpRow<kBasis>;
+  const WarpSample<kBasis> warp(field, samples[i], slot_of_point, rays);
+  float d_blend[Row::kParts] = {};
+#pragma unroll
+  for (int part = 0; part < Row::kParts; ++part) {
+    const int at = warp.lane + 32 * part;
+    const bool is_mass = at >= Row::kMass && at < Row::kMass + 3;
+    const int c = is_mass ? at - Row::kMass : at / kBasis;
+    if (c < 3 && (bits >> c & 1) != 0)
+      d_blend[part] =
+          warp.sample.weight *
+          (is_mass ? static_cast<float>(warp.sample.vertex >= 0) : d[c] * warp.gamma[part]);
+  }
 #pragma unroll
   for (int k = 0; k < 8; ++k) {
     const int32_t at = __shfl_sync(kAllLanes, warp.slot, k);
     const float w = __shfl_sync(kAllLanes, warp.corner, k);
-    if (at >= 0 && d_blend != 0)
-      AddTo<kExact>(d_rows, int64_t{at} * kRowLanes + warp.lane, w * d_blend);
+    if (at < 0) continue;
+#pragma unroll
+    for (int part = 0; part < Row::kParts; ++part)
+      if (d_blend[part] != 0)
+        AddTo<kExact>(d_rows, int64_t{at} * Row::kStride + warp.lane + 32 * part,
+                      w * d_blend[part]);
   }
 }
 
-template <bool kExact>
+template <int kBasis, bool kExact>
 __global__ void BlendRowsKernel(StyleFieldView field, const DeviceWeightedSample* samples,
                                 int64_t n, const int32_t* counted, const int32_t* slot_of_point,
                                 const float* rows, float* sums) {
   const int64_t i = ItemOfWarp(n, counted);
   if (i < 0) return;
-  const WarpSample warp(field, samples[i], slot_of_point, nullptr);
-  AddTo<kExact>(sums, int64_t{warp.sample.ray} * kRowLanes + warp.lane,
-                warp.sample.weight * warp.Blend(rows));
+  using Row = WarpRow<kBasis>;
+  const WarpSample<kBasis> warp(field, samples[i], slot_of_point, nullptr);
+  float blend[Row::kParts];
+  warp.Blend(rows, blend);
+#pragma unroll
+  for (int part = 0; part < Row::kParts; ++part)
+    AddTo<kExact>(sums, int64_t{warp.sample.ray} * Row::kStride + warp.lane + 32 * part,
+                  warp.sample.weight * blend[part]);
 }
 
 constexpr int64_t kFloatBytes = sizeof(float);
 
-// What is left of integer sums: values [n], the rows of kRowLanes that are counted.
-void TakeExact(const float* exact, int64_t n, const int32_t* counted, float* values) {
-  TakeExactKernel<<<BlocksFor(n), kThreads, 0, LaunchStream()>>>(exact, n, kRowLanes, counted,
-                                                                 values);
+// What is left of integer sums: values [n], the rows that are counted.
+void TakeExact(const float* exact, int64_t n, const NetworkRow& row, const int32_t* counted,
+               float* values) {
+  TakeExactKernel<<<BlocksFor(n), kThreads, 0, LaunchStream()>>>(exact, n, row.stride(),
+                                                                 counted, values);
   CheckLaunch("take_exact");
+}
+
+// Calls launch(basis, exact) with the template's arguments.
+template <typename Launch>
+void ByRowAndSums(const NetworkRow& row, bool exact, const Launch& launch) {
+  ByRow(row, [&](auto basis) {
+    if (exact)
+      launch(basis, std::true_type());
+    else
+      launch(basis, std::false_type());
+  });
 }
 
 }  // namespace
@@ -183,13 +233,15 @@ void BlendColors(const DeviceStyleField& field, const DeviceRayWeights& weights,
   float* const sums = exact != nullptr ? exact : &color->x;
   DeviceZero(sums, (exact != nullptr ? 2 : 1) * values * kFloatBytes);
   if (weights.num_samples > 0) {
-    const auto kernel = exact != nullptr ? BlendColorsKernel<true> : BlendColorsKernel<false>;
-    kernel<<<BlocksFor(32 * weights.num_samples), kThreads, 0, LaunchStream()>>>(
-        field.view(), weights.samples.data(), weights.num_samples, weights.counter.data(),
-        slots.slot_of_point.data(), rays, rows, sums, unclamped);
+    ByRowAndSums(field.row(), exact != nullptr, [&](auto basis, auto in_integers) {
+      BlendColorsKernel<basis(), in_integers()>
+          <<<BlocksFor(32 * weights.num_samples), kThreads, 0, LaunchStream()>>>(
+              field.view(), weights.samples.data(), weights.num_samples, weights.counter.data(),
+              slots.slot_of_point.data(), rays, rows, sums, unclamped);
+    });
     CheckLaunch("blend_colors");
   }
-  if (exact != nullptr) TakeExact(exact, values, nullptr, &color->x);
+  if (exact != nullptr) TakeExact(exact, values, field.row(), nullptr, &color->x);
   AddBackgroundKernel<<<BlocksFor(weights.num_rays), kThreads, 0, LaunchStream()>>>(
       field.grid.background, weights.transmittance.data(), weights.num_rays, color);
   CheckLaunch("add_background");
@@ -199,32 +251,36 @@ void BlendColorsAdjoint(const DeviceStyleField& field, const DeviceRayWeights& w
                         const DeviceSlots& slots, const Ray* rays, const uint8_t* unclamped,
                         const Vec3f* d_color, float* d_rows, float* exact) {
   if (weights.num_samples > 0) {
-    const auto kernel =
-        exact != nullptr ? BlendColorsAdjointKernel<true> : BlendColorsAdjointKernel<false>;
-    kernel<<<BlocksFor(32 * weights.num_samples), kThreads, 0, LaunchStream()>>>(
-        field.view(), weights.samples.data(), weights.num_samples, weights.counter.data(),
-        slots.slot_of_point.data(), rays, unclamped, d_color,
-        exact != nullptr ? exact : d_rows);
+    ByRowAndSums(field.row(), exact != nullptr, [&](auto basis, auto in_integers) {
+      BlendColorsAdjointKernel<basis(), in_integers()>
+          <<<BlocksFor(32 * weights.num_samples), kThreads, 0, LaunchStream()>>>(
+              field.view(), weights.samples.data(), weights.num_samples, weights.counter.data(),
+              slots.slot_of_point.data(), rays, unclamped, d_color,
+              exact != nullptr ? exact : d_rows);
+    });
     CheckLaunch("blend_colors_adjoint");
   }
   if (exact != nullptr && slots.num_slots > 0)
-    TakeExact(exact, slots.num_slots * kRowLanes, slots.counter.data(), d_rows);
+    TakeExact(exact, slots.num_slots * field.row().stride(), field.row(), slots.counter.data(),
+              d_rows);
 }
 
 void BlendRows(const DeviceStyleField& field, const DeviceRayWeights& weights,
                const DeviceSlots& slots, const float* rows, float* sums, float* exact) {
-  const int64_t values = weights.num_rays * kRowLanes;
+  const int64_t values = weights.num_rays * field.row().stride();
   if (values == 0) return;
   float* const to = exact != nullptr ? exact : sums;
   DeviceZero(to, (exact != nullptr ? 2 : 1) * values * kFloatBytes);
   if (weights.num_samples > 0) {
-    const auto kernel = exact != nullptr ? BlendRowsKernel<true> : BlendRowsKernel<false>;
-    kernel<<<BlocksFor(32 * weights.num_samples), kThreads, 0, LaunchStream()>>>(
-        field.view(), weights.samples.data(), weights.num_samples, weights.counter.data(),
-        slots.slot_of_point.data(), rows, to);
+    ByRowAndSums(field.row(), exact != nullptr, [&](auto basis, auto in_integers) {
+      BlendRowsKernel<basis(), in_integers()>
+          <<<BlocksFor(32 * weights.num_samples), kThreads, 0, LaunchStream()>>>(
+              field.view(), weights.samples.data(), weights.num_samples, weights.counter.data(),
+              slots.slot_of_point.data(), rows, to);
+    });
     CheckLaunch("blend_rows");
   }
-  if (exact != nullptr) TakeExact(exact, values, nullptr, sums);
+  if (exact != nullptr) TakeExact(exact, values, field.row(), nullptr, sums);
 }
 
 #else

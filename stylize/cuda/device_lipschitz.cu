@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <cfloat>
 
 #include "kernels/base/error.h"
@@ -284,14 +285,15 @@ DeviceLipschitz::DeviceLipschitz(const std::vector<std::pair<int, int>>& shapes,
     : params_(params), state_(1, "the optimizer's state"), not_finite_(1, "a flag") {
   REGRADE_CHECK(static_cast<int>(shapes.size()) <= kMaxLayers);
   shape_.layers = static_cast<int>(shapes.size());
+  const int ends = MlpEndLanes(std::max(shapes.front().second, shapes.back().first));
   int parameters = 0, vectors = 0;
   for (int l = 0; l < shape_.layers; ++l) {
     const auto [outputs, inputs] = shapes[static_cast<size_t>(l)];
     REGRADE_CHECK(outputs <= kMlpHidden && inputs <= kMlpHidden);
     shape_.outputs[l] = outputs;
     shape_.inputs[l] = inputs;
-    shape_.mlp_outputs[l] = l + 1 == shape_.layers ? kMlpEndLanes : kMlpHidden;
-    shape_.mlp_inputs[l] = l == 0 ? kMlpEndLanes : kMlpHidden;
+    shape_.mlp_outputs[l] = l + 1 == shape_.layers ? ends : kMlpHidden;
+    shape_.mlp_inputs[l] = l == 0 ? ends : kMlpHidden;
     shape_.mlp[l] = static_cast<int>(mlp.ParameterOffset(static_cast<size_t>(l)));
     shape_.parameters[l] = parameters;
     shape_.vectors[l] = vectors;

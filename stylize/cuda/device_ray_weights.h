@@ -77,12 +77,13 @@ void ClampToCapacity(int64_t slot_capacity, DeviceRayWeights* weights, DeviceSlo
 void BlendColors(const DeviceStyleField& field, const DeviceRayWeights& weights,
                  const DeviceSlots& slots, const Ray* rays, const float* rows, Vec3f* color,
                  uint8_t* unclamped, float* exact);
-// Its adjoint: adds to d_rows [slots, kRowLanes], the masses of EQ(view-penalty) among them.
-// With `exact` it adds to that, and d_rows is what has been added since it was zero.
+// Its adjoint: adds to d_rows [slots, stride of field.row()], the masses of EQ(view-penalty)
+// among them. With `exact` it adds to that, and d_rows is what has been added since it was
+// zero.
 void BlendColorsAdjoint(const DeviceStyleField& field, const DeviceRayWeights& weights,
                         const DeviceSlots& slots, const Ray* rays, const uint8_t* unclamped,
                         const Vec3f* d_color, float* d_rows, float* exact);
-// sums [rays, kRowLanes] = sum_i w_i of the blended rows themselves.
+// sums [rays, stride] = sum_i w_i of the blended rows themselves.
 void BlendRows(const DeviceStyleField& field, const DeviceRayWeights& weights,
                const DeviceSlots& slots, const float* rows, float* sums, float* exact);
 

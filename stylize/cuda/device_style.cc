@@ -13,15 +13,13 @@
 namespace regrade {
 namespace {
 
-static_assert(kRowLanes == kFeatureStride && kRowLanes == kMlpEndLanes);
-
 constexpr int64_t kBandRays = 1 << 16;
 
 void AddBaseMap(const LipschitzNetworkData& data, const float* features, int64_t n,
                 float* rows) {
   if (!data.has_base) return;
   const RowMap map = RowMapOf(data.base);
-  AddMappedRows(map.matrix, map.constant, features, n, rows);
+  AddMappedRows({data.basis}, map.matrix, map.constant, features, n, rows);
 }
 
 // Grown, never shrunk: what one step needed the next one needs about as much of.
@@ -37,6 +35,7 @@ class DeviceStyleLoss : public StyleLoss {
   DeviceStyleLoss(const DeviceStyleField* field, const AggregationOptions& options)
       : field_(*field),
         options_(options),
+        stride_(field->row().stride()),
         touched_(field->grid),
         slots_(field->grid),
         sums_(1, "sums of a loss") {
@@ -53,7 +52,7 @@ class DeviceStyleLoss : public StyleLoss {
     Forward(network.Effective<float>(), precision);
     AddBaseMap(network.data(), features_.data(), slots_.num_slots, rows_.data());
     if (gradient != nullptr) {
-      const int64_t values = slots_.num_slots * kRowLanes;
+      const int64_t values = slots_.num_slots * stride_;
       Reserve(values, "gradients of styled voxels", &d_rows_);
       float* const sums = options_.exact_sums ? Exact(values, &exact_rows_) : d_rows_.data();
       DeviceZero(sums, (options_.exact_sums ? 2 : 1) * values * int64_t{sizeof(float)});
@@ -66,9 +65,9 @@ class DeviceStyleLoss : public StyleLoss {
                            d_color_.data(), d_rows_.data(), exact_rows_.data());
     });
     if (gradient != nullptr) {
-      AddViewPenalty(BaseOf(network.data()).matrix, features_.data(), rows_.data(),
-                     slots_.num_slots, static_cast<float>(options_.view_weight), d_rows_.data(),
-                     &sums_.data()->loss);
+      AddViewPenalty(field_.row(), BaseOf(network.data()).matrix, features_.data(),
+                     rows_.data(), slots_.num_slots, static_cast<float>(options_.view_weight),
+                     d_rows_.data(), &sums_.data()->loss);
     }
     DeviceColorLoss sums;
     sums_.CopyOut(&sums, 1);
@@ -83,8 +82,7 @@ class DeviceStyleLoss : public StyleLoss {
     mlp_->AddAdjoint(precision, features_.data(), d_rows_.data(), slots_.num_slots);
     DenseNetwork<double> d_effective;
     for (int l = 0; l < kNetworkLayers; ++l)
-      d_effective.layers.emplace_back(LipschitzNetwork::Outputs(l),
-                                      LipschitzNetwork::Inputs(l));
+      d_effective.layers.emplace_back(network.Outputs(l), network.Inputs(l));
     mlp_->TakeGradient(&d_effective);
     std::vector<double> sum(gradient->size());
     network.AddGradient(d_effective, &sum);
@@ -116,17 +114,17 @@ class DeviceStyleLoss : public StyleLoss {
         sums.missing.push_back(target[c] - color[static_cast<size_t>(r)][c]);
     }
     sums.hidden.resize(counted.size() * kMlpHidden);
-    std::vector<float> band(static_cast<size_t>(n * kRowLanes));
-    DeviceBuffer<float> of_rays(std::min(n, kBandRays) * kRowLanes, "hidden sums of rays");
-    for (int half = 0; half < kMlpHidden; half += kRowLanes) {
+    std::vector<float> band(static_cast<size_t>(n * stride_));
+    DeviceBuffer<float> of_rays(std::min(n, kBandRays) * stride_, "hidden sums of rays");
+    for (int half = 0; half < kMlpHidden; half += stride_) {
       Forward(HiddenUnits(network, half), MlpPrecision::kSplit);
       ForEachBand([&](int64_t begin, int64_t count) {
         BlendRows(field_, weights_, slots_, rows_.data(), of_rays.data(),
-                  Exact(count * kRowLanes, &exact_sums_));
-        of_rays.CopyOut(band.data() + begin * kRowLanes, count * kRowLanes);
+                  Exact(count * stride_, &exact_sums_));
+        of_rays.CopyOut(band.data() + begin * stride_, count * stride_);
       });
       for (size_t i = 0; i < counted.size(); ++i)
-        std::copy_n(band.data() + counted[i] * kRowLanes, kRowLanes,
+        std::copy_n(band.data() + counted[i] * stride_, stride_,
                     sums.hidden.data() + i * kMlpHidden + static_cast<size_t>(half));
     }
     return sums;
@@ -135,6 +133,7 @@ class DeviceStyleLoss : public StyleLoss {
  private:
   // Which voxels the rays touch, and their features.
   AggregationResult Touch(const LipschitzNetwork& network, const StyleRays& batch) {
+    REGRADE_CHECK_EQ(network.row().stride(), stride_);
     batch_ = &batch;
     num_rays_ = static_cast<int64_t>(batch.rays.size());
     Reserve(num_rays_, "rays", &rays_);
@@ -149,8 +148,8 @@ class DeviceStyleLoss : public StyleLoss {
     }
     slots_.Assign(&touched_);
     result.touched_voxels = slots_.num_slots;
-    Reserve(slots_.num_slots * kRowLanes, "features of touched voxels", &features_);
-    Reserve(slots_.num_slots * kRowLanes, "styled voxels", &rows_);
+    Reserve(slots_.num_slots * stride_, "features of touched voxels", &features_);
+    Reserve(slots_.num_slots * stride_, "styled voxels", &rows_);
     GatherRows(field_, slots_.point_of_slot.data(), 0, slots_.num_slots,
                network.data().position_scale, features_.data());
     return result;
@@ -207,6 +206,7 @@ class DeviceStyleLoss : public StyleLoss {
 
   const DeviceStyleField& field_;
   AggregationOptions options_;
+  int stride_;  // of rows
   DeviceTouched touched_;
   DeviceSlots slots_;
   DeviceRayWeights weights_;
@@ -217,7 +217,7 @@ class DeviceStyleLoss : public StyleLoss {
   DeviceBuffer<Ray> rays_;
   DeviceBuffer<Vec3f> targets_, color_, d_color_;
   DeviceBuffer<uint8_t> unclamped_;
-  DeviceBuffer<float> features_, rows_, d_rows_;  // [slots, kRowLanes]
+  DeviceBuffer<float> features_, rows_, d_rows_;  // [slots, stride_]
   DeviceBuffer<float> exact_rows_, exact_sums_;
   DeviceBuffer<DeviceColorLoss> sums_;
 };
@@ -232,11 +232,12 @@ std::unique_ptr<StyleLoss> MakeDeviceStyleLoss(const DeviceStyleField* field,
 void RestyleOnDevice(const LipschitzNetwork& network, DeviceStyleField* field) {
   const DeviceGrid& grid = field->grid;
   REGRADE_CHECK(!grid.fitting);
+  REGRADE_CHECK_EQ(network.row().basis, field->row().basis);
   const DeviceRange range("restyling the field");
-  constexpr int64_t kChunk = 1 << 20;  // points; 256 MiB of features and results
+  constexpr int64_t kChunk = 1 << 20;  // points; 256 or 512 MiB of features and results
   const int64_t room = std::min(std::max(grid.num_voxels(), grid.spheres.num_texels()), kChunk);
-  DeviceBuffer<float> features(room * kRowLanes, "features of voxels");
-  DeviceBuffer<float> rows(room * kRowLanes, "styled voxels");
+  DeviceBuffer<float> features(room * field->row().stride(), "features of voxels");
+  DeviceBuffer<float> rows(room * field->row().stride(), "styled voxels");
   const DeviceMlp mlp(MakeFusedMlp(network.Effective<float>()));
   const auto restyle = [&](int64_t first, int64_t end) {
     for (int64_t begin = first; begin < end; begin += kChunk) {

@@ -6,6 +6,7 @@
 #include "kernels/field/cuda/device_grid.h"
 #include "kernels/field/radiance_field.h"
 #include "kernels/splats/cuda/device_splat_weigher.h"
+#include "stylize/field/network_row.h"
 
 namespace regrade {
 
@@ -19,6 +20,7 @@ struct DeviceStyleField {
   DeviceGrid grid;                             // see StyleFieldView
   std::unique_ptr<DeviceSplatWeigher> splats;  // null of voxels
 
+  NetworkRow row() const { return RowOf(grid.basis); }
   StyleFieldView view() const {
     return {grid.view(), grid.basis,
             splats != nullptr ? splats->splats().mean.data() : nullptr};

@@ -13,10 +13,10 @@
 namespace regrade {
 namespace {
 
-std::vector<std::pair<int, int>> LayerShapes() {
+std::vector<std::pair<int, int>> LayerShapes(const LipschitzNetwork& network) {
   std::vector<std::pair<int, int>> shapes;
   for (int l = 0; l < kNetworkLayers; ++l)
-    shapes.emplace_back(LipschitzNetwork::Outputs(l), LipschitzNetwork::Inputs(l));
+    shapes.emplace_back(network.Outputs(l), network.Inputs(l));
   return shapes;
 }
 
@@ -29,7 +29,7 @@ TrainingParams ParamsOf(const DeviceGrid& grid, const AggregationOptions& option
                         const WeightUpdate& update, const LipschitzNetworkData& network) {
   return {.update = update,
           .input_scale = network.sh_scale,
-          .scaled_inputs = kNetworkSh,
+          .scaled_inputs = NetworkRow{network.basis}.sh(),
           .loss_divisor = LossDivisor(grid, options)};
 }
 
@@ -49,7 +49,8 @@ class DeviceTraining::CapturedSteps {
         touched_(field->grid),
         slots_(field->grid),
         mlp_(MakeFusedMlp(network.Effective<float>())),
-        optimizer_(LayerShapes(), ParamsOf(field->grid, options, update, network.data()), mlp_),
+        optimizer_(LayerShapes(network), ParamsOf(field->grid, options, update, network.data()),
+                   mlp_),
         rays_(rays_per_step, "rays"),
         targets_(rays_per_step, "colours of rays"),
         color_(rays_per_step, "colours of rays"),
@@ -59,6 +60,7 @@ class DeviceTraining::CapturedSteps {
         demand_(1, "buffer sizes that a step needed"),
         stats_(most_steps, "statistics of steps") {
     stats_.Zero();
+    REGRADE_CHECK_EQ(network.row().basis, field->row().basis);
     REGRADE_CHECK(!field->grid.fitting && !options.every_voxel);
     REGRADE_CHECK(rays_per_step > 0 && rays_per_step <= kMostRays);
   }
@@ -119,7 +121,7 @@ class DeviceTraining::CapturedSteps {
     slot_capacity_ = std::min(slots, field_.grid.num_points());
     weights_ = {};
     weights_.Reserve(rays_.size(), sample_capacity_);
-    const int64_t floats = slot_capacity_ * kRowLanes;
+    const int64_t floats = slot_capacity_ * field_.row().stride();
     features_ = {};
     features_ = DeviceBuffer<float>(floats, "features of touched voxels");
     rows_ = {};
@@ -153,8 +155,8 @@ class DeviceTraining::CapturedSteps {
     mlp_.Forward(MlpPrecision::kTensor, features_.data(), slot_capacity_, rows_.data(),
                  touched);
     if (has_base_)
-      AddMappedRows(base_.matrix, base_.constant, features_.data(), slot_capacity_,
-                    rows_.data(), touched);
+      AddMappedRows(field_.row(), base_.matrix, base_.constant, features_.data(),
+                    slot_capacity_, rows_.data(), touched);
     (options_.exact_sums ? exact_rows_ : d_rows_).Zero();
     sums_.Zero();
     BlendColors(field_, weights_, slots_, rays_.data(), rows_.data(), color_.data(),
@@ -164,7 +166,7 @@ class DeviceTraining::CapturedSteps {
                  sums_.data());
     BlendColorsAdjoint(field_, weights_, slots_, rays_.data(), unclamped_.data(),
                        d_color_.data(), d_rows_.data(), exact_rows_.data());
-    AddViewPenalty(base_.matrix, features_.data(), rows_.data(), slot_capacity_,
+    AddViewPenalty(field_.row(), base_.matrix, features_.data(), rows_.data(), slot_capacity_,
                    static_cast<float>(options_.view_weight), d_rows_.data(),
                    &sums_.data()->loss, touched);
     mlp_.AddAdjoint(MlpPrecision::kTensor, features_.data(), d_rows_.data(), slot_capacity_,
@@ -246,7 +248,7 @@ class DeviceTraining::CapturedSteps {
   DeviceBuffer<BufferDemand> demand_;
   DeviceBuffer<StepStats> stats_;
   DeviceBuffer<uint8_t> unclamped_;
-  DeviceBuffer<float> features_, rows_, d_rows_;  // [slot_capacity_, kRowLanes]
+  DeviceBuffer<float> features_, rows_, d_rows_;  // [slot_capacity_, stride]
   int64_t sample_capacity_ = 0, slot_capacity_ = 0;
   int64_t begun_from_ = 0, begun_ = 0, regrown_ = 0;
   int32_t rejected_in_a_row_ = 0;

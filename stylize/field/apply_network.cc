@@ -8,6 +8,10 @@ namespace regrade {
 
 Appearance ApplyNetwork(const LipschitzNetwork& network, const RadianceField& field,
                         const ProgressFunction& progress) {
+  if (network.row().basis != RowOf(field.appearance.basis).basis)
+    throw InputError(Concat("it knows ", network.row().basis,
+                            " harmonics a channel, the field has ", field.appearance.basis),
+                     "network.npz", "run regrade stylize again");
   return ApplyForward([&](const float* features, int64_t n,
                           float* output) { network.Forward(features, n, output); },
                       network.data().position_scale, field, progress);
@@ -20,15 +24,16 @@ Appearance ApplyForward(const ForwardPass& forward, float position_scale,
   const int64_t n = field.geometry->num_voxels();
   Appearance styled = field.appearance;
   const int basis = styled.basis;
+  const NetworkRow shape = RowOf(basis);
   const SphereGeometry& spheres = field.geometry->spheres;
   const std::vector<int32_t> place = PlaceOfColumn(spheres);
   const int64_t all = n + spheres.num_texels();
-  Buffer<float> features(std::min(all, kChunk) * kFeatureStride), output(features.size());
+  Buffer<float> features(std::min(all, kChunk) * shape.stride()), output(features.size());
   for (int64_t begin = 0; begin < all; begin += kChunk) {
     const int64_t count = std::min(kChunk, all - begin);
 #pragma omp parallel for schedule(static)
     for (int64_t i = 0; i < count; ++i) {
-      float* const row = features.data() + i * kFeatureStride;
+      float* const row = features.data() + i * shape.stride();
       const int64_t point = begin + i, texel = point - n;
       if (texel < 0)
         FillFeatures(field, position_scale, point, vertex[point], row);
@@ -40,7 +45,7 @@ Appearance ApplyForward(const ForwardPass& forward, float position_scale,
     for (int64_t i = 0; i < count; ++i) {
       const int64_t point = begin + i, texel = point - n;
       for (int c = 0; c < 3; ++c) {
-        const float* const row = output.data() + i * kFeatureStride + c * 9;
+        const float* const row = output.data() + i * shape.stride() + c * shape.basis;
         if (texel < 0)
           std::copy_n(row, basis, styled.sh.data() + (point * 3 + c) * basis);
         else

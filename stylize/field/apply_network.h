@@ -10,12 +10,12 @@
 namespace regrade {
 
 // Of the field's own basis; texels of background spheres go through it as plain colours. Throws
-// Interrupted on kStop.
+// InputError for a network that was made for another NetworkRow, and Interrupted on kStop.
 Appearance ApplyNetwork(const LipschitzNetwork& network, const RadianceField& field,
                         const ProgressFunction& progress = nullptr);
 
-// The same with another forward pass, such as that of rounded weights: output [n,
-// kFeatureStride] of features [n, kFeatureStride].
+// The same with another forward pass, such as that of rounded weights: output [n, stride] of
+// features [n, stride], see NetworkRow.
 using ForwardPass = std::function<void(const float* features, int64_t n, float* output)>;
 Appearance ApplyForward(const ForwardPass& forward, float position_scale,
                         const RadianceField& field, const ProgressFunction& progress = nullptr);

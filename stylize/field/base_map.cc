@@ -80,20 +80,20 @@ ColorMap LeastSquaresMap(const RadianceField& field, const StyleRays& batch,
   return sum.Solve();
 }
 
-LipschitzNetwork NetworkOfMap(const ColorMap& map) {
-  LipschitzNetwork network;
+LipschitzNetwork NetworkOfMap(const ColorMap& map, int basis) {
+  LipschitzNetwork network(basis);
   network.data().has_base = true;
   network.data().base = map;
   return network;
 }
 
 RowMap RowMapOf(const ColorMap& map) {
-  const double zeros[kNetworkSh] = {};
-  double of_zero[kNetworkSh];
-  MapCoefficients(map, 9, zeros, of_zero);
+  const double zeros[3] = {};
+  double of_zero[3];
+  MapCoefficients(map, 1, zeros, of_zero);
   RowMap rows;
   for (int c = 0; c < 3; ++c) rows.matrix.row[c] = map.matrix.row[c].Cast<float>();
-  rows.constant = Vec3d{of_zero[0], of_zero[9], of_zero[18]}.Cast<float>();
+  rows.constant = Vec3d{of_zero[0], of_zero[1], of_zero[2]}.Cast<float>();
   return rows;
 }
 

@@ -16,10 +16,10 @@ ColorMap LeastSquaresMap(const RadianceField& field, const StyleRays& batch,
                          const AggregationOptions& options, RayWeigher* weigher = nullptr);
 
 // A network whose residual is exactly zero: the map alone, carried into coefficients.
-LipschitzNetwork NetworkOfMap(const ColorMap& map);
+LipschitzNetwork NetworkOfMap(const ColorMap& map, int basis = kMaxVoxelBasis);
 
-// The map as it acts on rows of nine coefficients a channel: row -> (matrix (x) I_9) row +
-// constant on each channel's first.
+// The map as it acts on rows of coefficients: row -> (matrix (x) I_B) row + constant on each
+// channel's first.
 struct RowMap {
   Mat3f matrix;
   Vec3f constant;

@@ -11,11 +11,12 @@
 namespace regrade {
 namespace {
 
-constexpr int kHarmonics = 9, kTerms = 3 * kHarmonics;
-
-// The rays as a matrix on the coefficients [seen voxels, 3, 9].
+// The rays as a matrix on the coefficients [seen voxels, 3, kHarmonics].
+template <int kHarmonics>
 class Coefficients {
  public:
+  static constexpr int kTerms = 3 * kHarmonics;
+
   Coefficients(const RadianceField& field, const std::vector<Camera>& cameras,
                const std::vector<Image>& missing, const CoefficientFitOptions& options) {
     const int64_t most = options.most_rays / std::max<int64_t>(1, std::ssize(cameras));
@@ -104,7 +105,7 @@ class Coefficients {
   std::vector<int64_t> seen_;
   std::vector<Vec3f> directions_;  // [rays], of splats of each entry
   bool of_entries_ = false;
-  int harmonics_ = kHarmonics;
+  int harmonics_;
 };
 
 double Square(const std::vector<double>& x) {
@@ -114,7 +115,8 @@ double Square(const std::vector<double>& x) {
 }
 
 // Conjugate gradients on the normal equations (Hestenes and Stiefel 1952), the residual kept.
-std::vector<double> Solve(const Coefficients& matrix, int steps,
+template <int kHarmonics>
+std::vector<double> Solve(const Coefficients<kHarmonics>& matrix, int steps,
                           const ProgressFunction& progress) {
   std::vector<Vec3d> left;
   for (const Vec3f& t : matrix.rays().missing) left.push_back(t.Cast<double>());
@@ -138,6 +140,21 @@ std::vector<double> Solve(const Coefficients& matrix, int steps,
   return x;
 }
 
+template <int kHarmonics>
+RadianceField Fit(RadianceField field, const std::vector<Camera>& cameras,
+                  const std::vector<Image>& missing, const CoefficientFitOptions& options,
+                  const ProgressFunction& progress) {
+  constexpr int kTerms = 3 * kHarmonics;
+  field.appearance = PadShBasis(std::move(field.appearance), kHarmonics);
+  const Coefficients<kHarmonics> matrix(field, cameras, missing, options);
+  const std::vector<double> x = Solve(matrix, options.steps, progress);
+  for (size_t v = 0; v < matrix.seen().size(); ++v)
+    for (int k = 0; k < kTerms; ++k)
+      field.appearance.sh[kTerms * matrix.seen()[v] + k] +=
+          static_cast<float>(x[kTerms * v + static_cast<size_t>(k)]);
+  return field;
+}
+
 }  // namespace
 
 RadianceField FitCoefficients(RadianceField field, const std::vector<Camera>& cameras,
@@ -145,14 +162,8 @@ RadianceField FitCoefficients(RadianceField field, const std::vector<Camera>& ca
                               const CoefficientFitOptions& options,
                               const ProgressFunction& progress) {
   REGRADE_CHECK_EQ(cameras.size(), missing.size());
-  field.appearance = PadShBasis(std::move(field.appearance), kHarmonics);
-  const Coefficients matrix(field, cameras, missing, options);
-  const std::vector<double> x = Solve(matrix, options.steps, progress);
-  for (size_t v = 0; v < matrix.seen().size(); ++v)
-    for (int k = 0; k < kTerms; ++k)
-      field.appearance.sh[kTerms * matrix.seen()[v] + k] +=
-          static_cast<float>(x[kTerms * v + static_cast<size_t>(k)]);
-  return field;
+  const auto fit = field.appearance.basis > 9 ? Fit<kMaxBasis> : Fit<9>;
+  return fit(std::move(field), cameras, missing, options, progress);
 }
 
 }  // namespace regrade

@@ -16,7 +16,7 @@ struct CoefficientFitOptions {
   int steps = 60;                        // of conjugate gradients
   int64_t most_rays = int64_t{1} << 40;  // of all views, chosen at random
   uint64_t seed = 0;
-  int harmonics = 9;  // 1: only a colour is added to each voxel
+  int harmonics = 16;  // at most; 1: only a colour is added to each voxel
 };
 
 // EQ(coefficient-fit), as Instant Colorization solves it for splats: coefficients x_vck of
@@ -27,7 +27,8 @@ struct CoefficientFitOptions {
 // that are not finite do not count. By `steps` of conjugate gradients from x = 0: what is seen
 // from few places is not driven far. Clamps of colours are left out.
 //
-// Returns the field with x added; it has 9 harmonics. Deterministic for any number of threads.
+// Returns the field with x added; it has 9 harmonics, or its own 16. Deterministic for any
+// number of threads.
 RadianceField FitCoefficients(RadianceField field, const std::vector<Camera>& cameras,
                               const std::vector<Image>& missing,
                               const CoefficientFitOptions& options,

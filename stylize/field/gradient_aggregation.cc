@@ -5,10 +5,11 @@
 #include <algorithm>
 #include <numeric>
 
-#include "kernels/field/sample_basis.h"
+#include "kernels/base/error.h"
 #include "kernels/field/trilinear.h"
 #include "stylize/field/base_map.h"
 #include "stylize/field/color_error.h"
+#include "stylize/field/styled_ray.h"
 #include "stylize/field/view_penalty.h"
 
 namespace regrade {
@@ -20,9 +21,9 @@ constexpr int64_t kBandRays = 16384;
 
 DenseNetwork<float> HiddenUnits(const LipschitzNetwork& network, int first) {
   DenseNetwork<float> hidden = network.Effective<float>();
-  hidden.layers.back() = DenseLayer<float>(kFeatureStride, kMlpHidden);
-  for (int o = 0; o < kFeatureStride; ++o)
-    hidden.layers.back().weight[o * kMlpHidden + first + o] = 1;
+  const int units = network.row().stride();
+  hidden.layers.back() = DenseLayer<float>(units, kMlpHidden);
+  for (int o = 0; o < units; ++o) hidden.layers.back().weight[o * kMlpHidden + first + o] = 1;
   return hidden;
 }
 
@@ -42,6 +43,7 @@ GradientAggregation::GradientAggregation(const RadianceField& field,
       weigher_(MakeRayWeigher(*field.geometry, field.near_clip, options.march,
                               options.min_weight, kManyViews)),
       corners_(field.geometry->splats.on() ? 1 : 8),
+      row_(RowOf(field.appearance.basis)),
       vertex_of_voxel_(VertexOfVoxel(*field.geometry)),
       place_of_column_(PlaceOfColumn(field.geometry->spheres)),
       slot_of_point_(static_cast<size_t>(field.geometry->num_voxels() +
@@ -77,105 +79,6 @@ void GradientAggregation::TouchAll() {
     slot_of_point_[point] = touched_[point] = static_cast<int32_t>(point);
 }
 
-namespace {
-
-// Background spheres have plain colours.
-int TermsOf(const WeightedSample& sample) { return sample.on_sphere() ? 1 : 9; }
-
-// Samples of one ray, each of which blends `kCorners` points.
-struct StyledRay {
-  const RayWeights& weights;
-  int64_t first, n;      // samples
-  const int32_t* slots;  // of all samples
-  SampleBasis<float> basis;
-
-  StyledRay(const RayWeights& weights, const std::vector<int32_t>& slots, int64_t ray,
-            int basis, const Vec3f& direction)
-      : weights(weights),
-        first(weights.first[static_cast<size_t>(ray)]),
-        n(weights.first[static_cast<size_t>(ray) + 1] - first),
-        slots(slots.data()),
-        basis(basis, direction, weights) {}
-};
-
-// Colours of a ray before the background, and which channels of which samples the clamp left
-// unclamped.
-template <int kCorners>
-Vec3f RenderStyled(StyledRay* ray, const float* sh, uint8_t* unclamped) {
-  Vec3f color{0, 0, 0};
-  for (int64_t i = ray->first; i < ray->first + ray->n; ++i) {
-    const WeightedSample& sample = ray->weights.samples[static_cast<size_t>(i)];
-    float blend[kFeatureStride] = {};
-    for (int corner = 0; corner < kCorners; ++corner) {
-      const int32_t slot = ray->slots[i * kCorners + corner];
-      if (slot < 0) continue;
-      const float w = CornerWeight(sample.fraction, corner);
-      const float* row = sh + static_cast<int64_t>(slot) * kFeatureStride;
-      for (int l = 0; l < kFeatureStride; ++l) blend[l] += w * row[l];
-    }
-    const int terms = TermsOf(sample);
-    const float* const gamma = ray->basis.Of(i);
-    uint8_t bits = 0;
-    for (int c = 0; c < 3; ++c) {
-      float value = 0.5f;
-      for (int k = 0; k < terms; ++k) value += blend[c * 9 + k] * gamma[k];
-      if (!(value > 0)) continue;
-      bits = static_cast<uint8_t>(bits | (1 << c));
-      color[c] += sample.weight * value;
-    }
-    unclamped[i] = bits;
-  }
-  return color;
-}
-
-// dL/d(blend) where no channel is clamped, without w_i, and 1 in the lanes of masses.
-void BlendAdjoint(const Vec3f& d_color, const float* gamma, float* d_blend) {
-  std::fill_n(d_blend, kFeatureStride, 0.0f);
-  for (int c = 0; c < 3; ++c)
-    for (int k = 0; k < 9; ++k) d_blend[c * 9 + k] = d_color[c] * gamma[k];
-  std::fill_n(d_blend + kMassLane, 3, 1.0f);
-}
-
-// Adds the adjoint of RenderStyled to the rows of d_sh in [begin, end), and the masses of
-// EQ(view-penalty).
-template <int kCorners>
-void ScatterStyled(StyledRay* ray, const uint8_t* unclamped, const Vec3f& d_color,
-                   int32_t begin, int32_t end, float* d_sh) {
-  float d_blend[kFeatureStride];
-  const float* gamma = nullptr;
-  const bool own = !ray->weights.directions.empty();  // directions of samples
-  for (int64_t i = ray->first; i < ray->first + ray->n; ++i) {
-    const uint8_t bits = unclamped[i];
-    if (bits == 0) continue;
-    const int32_t* const slots = ray->slots + i * kCorners;
-    if (kCorners == 1 && (slots[0] < begin || slots[0] >= end)) continue;
-    const WeightedSample& sample = ray->weights.samples[static_cast<size_t>(i)];
-    if (gamma == nullptr || own) BlendAdjoint(d_color, gamma = ray->basis.Of(i), d_blend);
-    float masked[kFeatureStride];
-    const float* d = d_blend;
-    const int terms = TermsOf(sample);
-    if (bits != 7 || terms != 9) {
-      std::copy_n(d_blend, kFeatureStride, masked);
-      for (int c = 0; c < 3; ++c) {
-        const bool is_unclamped = (bits & (1 << c)) != 0;
-        const int kept = is_unclamped ? terms : 0;
-        std::fill_n(masked + c * 9 + kept, 9 - kept, 0.0f);
-        if (kept < 9) masked[kMassLane + c] = 0;
-      }
-      d = masked;
-    }
-    for (int corner = 0; corner < kCorners; ++corner) {
-      const int32_t slot = slots[corner];
-      if (slot < begin || slot >= end) continue;
-      const float w = sample.weight * CornerWeight(sample.fraction, corner);
-      float* row = d_sh + static_cast<int64_t>(slot) * kFeatureStride;
-      for (int l = 0; l < kFeatureStride; ++l) row[l] += w * d[l];
-    }
-  }
-}
-
-}  // namespace
-
 void GradientAggregation::March(const StyleRays& batch, int64_t begin, int64_t end,
                                 Band* band) {
   band->begin = begin;
@@ -187,12 +90,12 @@ void GradientAggregation::March(const StyleRays& batch, int64_t begin, int64_t e
 void GradientAggregation::FillTouchedFeatures(float position_scale) {
   const int64_t slots = std::ssize(touched_);
   const int64_t voxels = field_.geometry->num_voxels();
-  features_.Resize(slots * kFeatureStride);
-  sh_.Resize(slots * kFeatureStride);
+  features_.Resize(slots * row_.stride());
+  sh_.Resize(slots * row_.stride());
 #pragma omp parallel for schedule(static)
   for (int64_t s = 0; s < slots; ++s) {
     const int32_t point = touched_[s];
-    float* const row = features_.data() + s * kFeatureStride;
+    float* const row = features_.data() + s * row_.stride();
     if (point < voxels) {
       FillFeatures(field_, position_scale, point, vertex_of_voxel_[point], row);
     } else {
@@ -211,8 +114,11 @@ void GradientAggregation::RenderColors(const StyleRays& batch, Band* band) const
   for (int64_t r = 0; r < weights.num_rays(); ++r) {
     StyledRay ray(weights, band->slots, r, field_.appearance.basis,
                   batch.rays[band->begin + r].direction);
-    const auto render = corners_ == 1 ? RenderStyled<1> : RenderStyled<8>;
-    band->color[r] = render(&ray, sh_.data(), band->unclamped.data()) +
+    band->color[r] = ByShape(corners_, row_,
+                             [&](auto shape) {
+                               return RenderStyled<decltype(shape)>(&ray, sh_.data(),
+                                                                    band->unclamped.data());
+                             }) +
                      field_.background * weights.transmittance[r];
   }
 }
@@ -231,8 +137,10 @@ void GradientAggregation::Scatter(const StyleRays& batch, const Band& band) {
       if (d_color == Vec3f{0, 0, 0}) continue;
       StyledRay ray(weights, band.slots, r, field_.appearance.basis,
                     batch.rays[band.begin + r].direction);
-      const auto scatter = corners_ == 1 ? ScatterStyled<1> : ScatterStyled<8>;
-      scatter(&ray, band.unclamped.data(), d_color, begin, end, d_sh_.data());
+      ByShape(corners_, row_, [&](auto shape) {
+        ScatterStyled<decltype(shape)>(&ray, band.unclamped.data(), d_color, begin, end,
+                                       d_sh_.data());
+      });
     }
   }
 }
@@ -243,18 +151,20 @@ double GradientAggregation::AddViewPenalty(const LipschitzNetworkData& data) {
   std::vector<double> sums(slots);  // summed up in order below
 #pragma omp parallel for schedule(static)
   for (int64_t s = 0; s < slots; ++s) {
-    const float* const from = features_.data() + s * kFeatureStride;
-    const float* const styled = sh_.data() + s * kFeatureStride;
-    float* const d = d_sh_.data() + s * kFeatureStride;
+    const float* const from = features_.data() + s * row_.stride();
+    const float* const styled = sh_.data() + s * row_.stride();
+    float* const d = d_sh_.data() + s * row_.stride();
+    float* const mass = d + row_.mass();
     for (int c = 0; c < 3; ++c) {
-      for (int k = 1; k < 9; ++k) {
-        const Vec3f source{from[k], from[9 + k], from[18 + k]};
+      for (int k = 1; k < row_.basis; ++k) {
+        const Vec3f source{from[k], from[row_.basis + k], from[2 * row_.basis + k]};
+        const int at = c * row_.basis + k;
         const ViewPenalty<float> penalty =
-            ViewPenaltyOf(d[kMassLane + c], styled[c * 9 + k] - Dot(map.matrix.row[c], source));
+            ViewPenaltyOf(mass[c], styled[at] - Dot(map.matrix.row[c], source));
         sums[s] += double{penalty.value};
-        d[c * 9 + k] += static_cast<float>(options_.view_weight) * penalty.derivative;
+        d[at] += static_cast<float>(options_.view_weight) * penalty.derivative;
       }
-      d[kMassLane + c] = 0;
+      mass[c] = 0;
     }
   }
   return options_.view_weight * std::accumulate(sums.begin(), sums.end(), 0.0);
@@ -273,6 +183,7 @@ void GradientAggregation::ForgetTouched() {
 AggregationResult GradientAggregation::Run(const LipschitzNetwork& network,
                                            const StyleRays& batch,
                                            std::vector<double>* gradient) {
+  REGRADE_CHECK_EQ(network.row().basis, row_.basis);
   const int64_t num_rays = std::ssize(batch.rays);
   const bool one_band = num_rays <= kBandRays;
   AggregationResult result;
@@ -289,7 +200,7 @@ AggregationResult GradientAggregation::Run(const LipschitzNetwork& network,
   network.Forward(features_.data(), slots, sh_.data());
   if (gradient != nullptr) {
     d_sh_.Clear();
-    d_sh_.Resize(slots * kFeatureStride);
+    d_sh_.Resize(slots * row_.stride());
   }
 
   double loss_sum = 0;
@@ -321,7 +232,7 @@ AggregationResult GradientAggregation::Run(const LipschitzNetwork& network,
 
   DenseNetwork<double> d_effective;
   for (int l = 0; l < kNetworkLayers; ++l)
-    d_effective.layers.emplace_back(LipschitzNetwork::Outputs(l), LipschitzNetwork::Inputs(l));
+    d_effective.layers.emplace_back(network.Outputs(l), network.Inputs(l));
   FusedAdjoint(MakeFusedMlp(network.Effective<float>()), features_.data(), d_sh_.data(), slots,
                &d_effective);
   std::vector<double> sum(gradient->size());
@@ -350,7 +261,7 @@ StyleLoss::HiddenSums GradientAggregation::SumHidden(const LipschitzNetwork& net
         sums.missing.push_back(batch.targets[begin + r][c] - band.color[r][c]);
     }
     sums.hidden.resize(sums.opacity.size() * kMlpHidden);
-    for (int half = 0; half < kMlpHidden; half += kFeatureStride) {
+    for (int half = 0; half < kMlpHidden; half += row_.stride()) {
       FusedForward(MakeFusedMlp(HiddenUnits(network, half)), features_.data(), slots,
                    sh_.data());
       size_t next = row;
@@ -363,8 +274,8 @@ StyleLoss::HiddenSums GradientAggregation::SumHidden(const LipschitzNetwork& net
             if (slot < 0) continue;
             const WeightedSample& sample = weights.samples[i];
             const float w = sample.weight * CornerWeight(sample.fraction, corner);
-            const float* h = sh_.data() + static_cast<int64_t>(slot) * kFeatureStride;
-            for (int l = 0; l < kFeatureStride; ++l) out[l] += w * h[l];
+            const float* h = sh_.data() + static_cast<int64_t>(slot) * row_.stride();
+            for (int l = 0; l < row_.stride(); ++l) out[l] += w * h[l];
           }
       }
     }

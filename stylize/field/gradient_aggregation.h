@@ -93,7 +93,7 @@ class StyleLoss {
  public:
   virtual ~StyleLoss() = default;
 
-  // Adds the gradient of L_rec to `gradient` [LipschitzNetwork::NumParameters()] unless it is
+  // Adds the gradient of L_rec to `gradient` [network.NumParameters()] unless it is
   // null. Rays are taken in bands, so memory grows with the touched voxels only.
   virtual AggregationResult Run(const LipschitzNetwork& network, const StyleRays& batch,
                                 std::vector<double>* gradient) = 0;
@@ -107,8 +107,8 @@ class StyleLoss {
   virtual HiddenSums SumHidden(const LipschitzNetwork& network, const StyleRays& batch) = 0;
 };
 
-// `network` cut off behind its last hidden layer: units first ... first + kFeatureStride - 1 of
-// that are its outputs.
+// `network` cut off behind its last hidden layer: as many of that layer's units as a row has
+// floats, from `first` on, are its outputs.
 DenseNetwork<float> HiddenUnits(const LipschitzNetwork& network, int first);
 
 // On the CPU. Results do not depend on the number of threads.
@@ -140,11 +140,12 @@ class GradientAggregation : public StyleLoss {
   AggregationOptions options_;
   std::unique_ptr<RayWeigher> weigher_;
   int corners_;  // points that a sample may blend
+  NetworkRow row_;
   std::vector<int32_t> vertex_of_voxel_, place_of_column_;
   // Of points, see CornerPoints: voxels, and then the texels of background spheres.
   std::vector<int32_t> slot_of_point_;  // -1 between runs
   std::vector<int32_t> touched_;        // point of slot
-  Buffer<float> features_, sh_, d_sh_;  // [slots, kFeatureStride]
+  Buffer<float> features_, sh_, d_sh_;  // [slots, row_.stride()]
 };
 
 }  // namespace regrade

@@ -23,33 +23,16 @@ constexpr struct {
                     {"sigmoid", Activation::kSigmoid},
                     {"tanh", Activation::kTanh}};
 
-int64_t WeightOffset(int layer) {
-  int64_t offset = 0;
-  for (int l = 0; l < layer; ++l)
-    offset +=
-        static_cast<int64_t>(LipschitzNetwork::Outputs(l)) * (LipschitzNetwork::Inputs(l) + 1) +
-        1;
-  return offset;
-}
-
-int64_t VectorOffset(int layer) {
-  int64_t offset = 0;
-  for (int l = 0; l < layer; ++l)
-    offset += LipschitzNetwork::Outputs(l) + LipschitzNetwork::Inputs(l);
-  return offset;
-}
-
 // A layer's W, u, v in another scalar, with the memory they live in.
 template <typename T>
 struct SpectralCopy {
   std::vector<T> weight, u, v;
 
   SpectralCopy(const LipschitzNetwork& network, int layer) {
-    const int outputs = LipschitzNetwork::Outputs(layer),
-              inputs = LipschitzNetwork::Inputs(layer);
+    const int outputs = network.Outputs(layer), inputs = network.Inputs(layer);
     const float* w = network.weight(layer);
     weight.assign(w, w + static_cast<int64_t>(outputs) * inputs);
-    const float* vectors = network.data().singular_vectors.data() + VectorOffset(layer);
+    const float* vectors = network.data().singular_vectors.data() + network.VectorOffset(layer);
     u.assign(vectors, vectors + outputs);
     v.assign(vectors + outputs, vectors + outputs + inputs);
   }
@@ -60,9 +43,8 @@ struct SpectralCopy {
 };
 
 SpectralView<float> ViewOfLayer(LipschitzNetwork* network, int layer) {
-  const int outputs = LipschitzNetwork::Outputs(layer),
-            inputs = LipschitzNetwork::Inputs(layer);
-  float* vectors = network->data().singular_vectors.data() + VectorOffset(layer);
+  const int outputs = network->Outputs(layer), inputs = network->Inputs(layer);
+  float* vectors = network->data().singular_vectors.data() + network->VectorOffset(layer);
   return {outputs, inputs, network->weight(layer), vectors, vectors + outputs};
 }
 
@@ -81,13 +63,30 @@ const char* NameOf(Activation activation) {
   return "";
 }
 
-int LipschitzNetwork::Outputs(int layer) {
-  return layer + 1 == kNetworkLayers ? kNetworkSh : kMlpHidden;
+int LipschitzNetwork::Outputs(int layer) const {
+  return layer + 1 == kNetworkLayers ? row().sh() : kMlpHidden;
 }
-int LipschitzNetwork::Inputs(int layer) { return layer == 0 ? kNetworkInputs : kMlpHidden; }
-int64_t LipschitzNetwork::NumParameters() { return WeightOffset(kNetworkLayers); }
+int LipschitzNetwork::Inputs(int layer) const {
+  return layer == 0 ? row().inputs() : kMlpHidden;
+}
+int64_t LipschitzNetwork::NumParameters() const { return WeightOffset(kNetworkLayers); }
 
-LipschitzNetwork::LipschitzNetwork() {
+int64_t LipschitzNetwork::WeightOffset(int layer) const {
+  int64_t offset = 0;
+  for (int l = 0; l < layer; ++l)
+    offset += static_cast<int64_t>(Outputs(l)) * (Inputs(l) + 1) + 1;
+  return offset;
+}
+
+int64_t LipschitzNetwork::VectorOffset(int layer) const {
+  int64_t offset = 0;
+  for (int l = 0; l < layer; ++l) offset += Outputs(l) + Inputs(l);
+  return offset;
+}
+
+LipschitzNetwork::LipschitzNetwork(int basis) {
+  REGRADE_CHECK(basis == kMaxVoxelBasis || basis == kMaxBasis);
+  data_.basis = basis;
   data_.parameters.resize(NumParameters());
   data_.singular_vectors.resize(VectorOffset(kNetworkLayers));
 }
@@ -96,6 +95,8 @@ LipschitzNetwork::LipschitzNetwork(LipschitzNetworkData data) : data_(std::move(
   const auto refuse = [](const std::string& what) {
     throw InputError("not a network: " + what, "network.npz", "run regrade stylize again");
   };
+  if (data_.basis != kMaxVoxelBasis && data_.basis != kMaxBasis)
+    refuse(Concat(data_.basis, " harmonics a channel"));
   if (std::ranges::none_of(
           kActivations, [this](const auto& entry) { return data_.activation == entry.name; }))
     refuse("unknown activation '" + data_.activation + "'");
@@ -143,8 +144,8 @@ DenseNetwork<T> LipschitzNetwork::Effective() const {
     std::copy_n(bias(l), Outputs(l), layer.bias.begin());
     if (l == 0)
       for (int o = 0; o < Outputs(l); ++o)
-        for (int i = 0; i < kNetworkSh; ++i)
-          layer.weight[static_cast<size_t>(o) * kNetworkInputs + i] *=
+        for (int i = 0; i < row().sh(); ++i)
+          layer.weight[static_cast<size_t>(o) * Inputs(l) + i] *=
               static_cast<T>(data_.sh_scale);
     network.layers.push_back(std::move(layer));
   }
@@ -161,8 +162,8 @@ void LipschitzNetwork::AddGradient(const DenseNetwork<double>& d_effective,
     std::vector<double> d_a = d_effective.layers[l].weight;
     if (l == 0)
       for (int o = 0; o < Outputs(l); ++o)
-        for (int i = 0; i < kNetworkSh; ++i)
-          d_a[static_cast<size_t>(o) * kNetworkInputs + i] *= data_.sh_scale;
+        for (int i = 0; i < row().sh(); ++i)
+          d_a[static_cast<size_t>(o) * Inputs(l) + i] *= data_.sh_scale;
     double* d_weight = gradient->data() + WeightOffset(l);
     double* d_bias = d_weight + static_cast<int64_t>(Outputs(l)) * Inputs(l);
     for (int o = 0; o < Outputs(l); ++o) d_bias[o] += d_effective.layers[l].bias[o];
@@ -177,12 +178,13 @@ void LipschitzNetwork::Forward(const float* features, int64_t n, float* output) 
   if (!data_.has_base) return;
 #pragma omp parallel for schedule(static)
   for (int64_t r = 0; r < n; ++r)
-    AddBaseMap(data_.base, features + r * kFeatureStride, output + r * kFeatureStride);
+    AddBaseMap(data_.base, data_.basis, features + r * row().stride(),
+               output + r * row().stride());
 }
 
 void LipschitzNetwork::ForwardPlain(const double* features, double* output) const {
   DenseForward(Effective<double>(), features, output);
-  if (data_.has_base) AddBaseMap(data_.base, features, output);
+  if (data_.has_base) AddBaseMap(data_.base, data_.basis, features, output);
 }
 
 double LipschitzNetwork::BaseNorm() const {
@@ -255,13 +257,14 @@ Vec3f VoxelPosition(const Geometry& geometry, int32_t vertex) {
 void FillFeatures(const RadianceField& field, float position_scale, int64_t voxel,
                   int32_t vertex, float* row) {
   const int basis = field.appearance.basis;
+  const NetworkRow shape = RowOf(basis);
   const float* sh = field.appearance.sh.data() + voxel * field.appearance.stride();
-  std::fill_n(row, kFeatureStride, 0.0f);
-  for (int c = 0; c < 3; ++c) std::copy_n(sh + c * basis, basis, row + c * 9);
+  std::fill_n(row, shape.stride(), 0.0f);
+  for (int c = 0; c < 3; ++c) std::copy_n(sh + c * basis, basis, row + c * shape.basis);
   const Geometry& geometry = *field.geometry;
   const Vec3f position =
       geometry.splats.on() ? PositionOfSplat(geometry, voxel) : VoxelPosition(geometry, vertex);
-  for (int a = 0; a < 3; ++a) row[kNetworkSh + a] = position_scale * position[a];
+  for (int a = 0; a < 3; ++a) row[shape.sh() + a] = position_scale * position[a];
 }
 
 double SpatialCount(const Geometry& geometry) {
@@ -276,10 +279,12 @@ double SpatialCount(const Geometry& geometry) {
 void FillTexelFeatures(const RadianceField& field, float position_scale, int64_t texel,
                        int32_t at, float* row) {
   const int resolution = field.geometry->spheres.resolution;
-  std::fill_n(row, kFeatureStride, 0.0f);
-  for (int c = 0; c < 3; ++c) row[c * 9] = field.appearance.sphere_color[3 * texel + c];
+  const NetworkRow shape = RowOf(field.appearance.basis);
+  std::fill_n(row, shape.stride(), 0.0f);
+  for (int c = 0; c < 3; ++c)
+    row[c * shape.basis] = field.appearance.sphere_color[3 * texel + c];
   const Vec3f direction = TexelDirection<float>(resolution, at / resolution, at % resolution);
-  for (int a = 0; a < 3; ++a) row[kNetworkSh + a] = position_scale * direction[a];
+  for (int a = 0; a < 3; ++a) row[shape.sh() + a] = position_scale * direction[a];
 }
 
 std::vector<int32_t> PlaceOfColumn(const SphereGeometry& spheres) {

@@ -1,11 +1,11 @@
 // The network that restyles a field's spherical harmonics, and the bound that is guaranteed for
 // it.
 //
-// EQ(liprf-network):  f(s, q) = (A (x) I_9) s + o + g(s, q),
-// s [27] the coefficients of a voxel, channel-major, q [3] its position in the box, scaled to
+// EQ(liprf-network):  f(s, q) = (A (x) I_B) s + o + g(s, q),
+// s [3 B] the coefficients of a record, channel-major, q [3] its position in the box, scaled to
 // [-position_scale, position_scale]; g is five activated layers of 64 and a linear one, each
 // EQ(lipschitz-layer); A and o carry a colour map into coefficients (LipRF, Lemma 2). LipRF's
-// own network has no colour map: A = 0, o = 0.
+// own network has no colour map: A = 0, o = 0. B is 9, or 16 of splats of degree 3.
 //
 // EQ(liprf-bound):  ||f(x) - f(y)|| <= (||A||_2 + L_act^5 prod_l ||A_l||_2) ||x - y||  for x =
 // (s, q), with ||A_1||_2 that of A_1 diag(sh_scale, 1). Norms are exact singular values, in
@@ -16,9 +16,9 @@
 // colours, not clipped to [0, 1], with
 //   |C(f) - C(g)| <= |Gamma| sum_i w_i |f_i - g_i| <= (1 - T) |Gamma| max_i |f_i - g_i|,
 // i the ray's samples: Cauchy and Schwarz in each channel, and the clamp at 0 moves no two
-// colours apart. |Gamma| = (L + 1) / (2 sqrt(pi)) in every direction: 0.846 at degree L = 2. So
-// two scenes whose coefficients differ by d have styles whose pictures differ by 0.846 B d at
-// most, of voxels and of splats.
+// colours apart. |Gamma| = (L + 1) / (2 sqrt(pi)) in every direction: 0.846 at degree L = 2,
+// 1.128 at L = 3. So two scenes whose coefficients differ by d have styles whose pictures
+// differ by |Gamma| times the bound times d at most, of voxels and of splats.
 #pragma once
 
 #include <cstdint>
@@ -28,21 +28,19 @@
 #include "kernels/base/buffer.h"
 #include "kernels/field/radiance_field.h"
 #include "kernels/network/dense_layer.h"
-#include "kernels/network/fused_mlp.h"
+#include "stylize/field/network_row.h"
 #include "stylize/linear_map.h"
 
 namespace regrade {
 
-inline constexpr int kNetworkSh = 27;                // coefficients in and out
-inline constexpr int kNetworkInputs = 30;            // and a position
-inline constexpr int kNetworkLayers = 6;             // five activated and the last
-inline constexpr int kFeatureStride = kMlpEndLanes;  // floats of a feature row: 27, 3, zeros
+inline constexpr int kNetworkLayers = 6;  // five activated and the last
 
 Activation ActivationByName(const std::string& name);  // throws Error(kUsage)
 const char* NameOf(Activation activation);
 
 // Everything that is stored of a network: plain, so that any file format can carry it.
 struct LipschitzNetworkData {
+  int basis = 9;  // see NetworkRow
   std::string activation = "sine";
   float omega = 1;           // of the sine
   float sh_scale = 1;        // coefficients are multiplied by it on the way in
@@ -56,16 +54,20 @@ struct LipschitzNetworkData {
 class LipschitzNetwork {
  public:
   // Zero weights.
-  LipschitzNetwork();
+  explicit LipschitzNetwork(int basis = kMaxVoxelBasis);
   // Throws Error(kInput) for sizes or values that are not a network.
   explicit LipschitzNetwork(LipschitzNetworkData data);
 
   const LipschitzNetworkData& data() const { return data_; }
   LipschitzNetworkData& data() { return data_; }
 
-  static int Outputs(int layer);
-  static int Inputs(int layer);
-  static int64_t NumParameters();
+  NetworkRow row() const { return {data_.basis}; }
+  int Outputs(int layer) const;
+  int Inputs(int layer) const;
+  int64_t NumParameters() const;
+  // Where a layer begins in LipschitzNetworkData's parameters and singular_vectors.
+  int64_t WeightOffset(int layer) const;
+  int64_t VectorOffset(int layer) const;
   float* weight(int layer);  // [Outputs, Inputs]
   float* bias(int layer);    // [Outputs]
   float& k(int layer);       // before squareplus
@@ -85,8 +87,7 @@ class LipschitzNetwork {
   void AddGradient(const DenseNetwork<double>& d_effective,
                    std::vector<double>* gradient) const;
 
-  // output [n, kFeatureStride]: coefficients [27] of features [n, kFeatureStride] (see
-  // FillFeatures).
+  // output [n, stride]: coefficients of features [n, stride] (see FillFeatures and NetworkRow).
   void Forward(const float* features, int64_t n, float* output) const;
   // The same for one row in double, plainly: the specification.
   void ForwardPlain(const double* features, double* output) const;
@@ -107,23 +108,23 @@ class LipschitzNetwork {
   LipschitzNetworkData data_;
 };
 
-// Adds (A (x) I_9) s + o to output [27] for coefficients s [27].
+// Adds (A (x) I_B) s + o to output [3, basis] for coefficients s [3, basis].
 template <typename T>
-void AddBaseMap(const ColorMap& map, const T* sh, T* output) {
-  T mapped[kNetworkSh];
-  MapCoefficients(map, 9, sh, mapped);
-  for (int i = 0; i < kNetworkSh; ++i) output[i] += mapped[i];
+void AddBaseMap(const ColorMap& map, int basis, const T* sh, T* output) {
+  T mapped[kLargestRow.sh()];
+  MapCoefficients(map, basis, sh, mapped);
+  for (int i = 0; i < 3 * basis; ++i) output[i] += mapped[i];
 }
 
 // The vertex of each voxel: the inverse of Geometry::links. Of an adaptive field, whose voxels
 // are vertices, and of splats, the voxel.
 std::vector<int32_t> VertexOfVoxel(const Geometry& geometry);
 
-// Feature row [kFeatureStride] of a voxel; `vertex` as VertexOfVoxel has it. Coefficients of a
-// smaller basis are padded with zeros, which leaves the bound as it is. An adaptive field has
-// one frame for the positions of all levels, see EQ(cell-lattice): where two cells of different
-// levels share a vertex, it is one record, restyled once.
-// Of splats see EQ(splat-position).
+// Feature row of a voxel, as RowOf(field.appearance.basis) says; `vertex` as VertexOfVoxel has
+// it. Coefficients of a smaller basis are padded with zeros, which leaves the bound as it is.
+// An adaptive field has one frame for the positions of all levels, see EQ(cell-lattice): where
+// two cells of different levels share a vertex, it is one record, restyled once. Of splats see
+// EQ(splat-position).
 void FillFeatures(const RadianceField& field, float position_scale, int64_t voxel,
                   int32_t vertex, float* row);
 

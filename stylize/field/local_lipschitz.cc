@@ -20,11 +20,13 @@ class Steepness {
  public:
   explicit Steepness(const LipschitzNetwork& network)
       : data_(network.data()), network_(network.Effective<double>()) {
-    base_ = MatrixXd::Zero(kNetworkSh, kNetworkInputs);
+    const int basis = data_.basis;
+    base_ = MatrixXd::Zero(network.row().sh(), network.row().inputs());
     if (!data_.has_base) return;
     for (int c = 0; c < 3; ++c)
       for (int d = 0; d < 3; ++d)
-        for (int k = 0; k < 9; ++k) base_(c * 9 + k, d * 9 + k) = data_.base.matrix(c, d);
+        for (int k = 0; k < basis; ++k)
+          base_(c * basis + k, d * basis + k) = data_.base.matrix(c, d);
   }
 
   // Columns are points. The base's offset is left out: it cancels in every difference.
@@ -40,7 +42,7 @@ class Steepness {
   }
 
   MatrixXd Jacobian(const VectorXd& point) const {
-    MatrixXd jacobian = MatrixXd::Identity(kNetworkInputs, kNetworkInputs);
+    MatrixXd jacobian = MatrixXd::Identity(point.size(), point.size());
     VectorXd x = point;
     for (size_t l = 0; l < network_.layers.size(); ++l) {
       const VectorXd sum = Weight(l) * x + Bias(l);
@@ -107,21 +109,23 @@ LocalLipschitz MeasureLocalLipschitz(const LipschitzNetwork& network,
   const int64_t n = field.geometry->num_voxels();
   if (n == 0) return result;
   const Steepness f(network);
+  const NetworkRow row = network.row();
+  const int inputs = row.inputs();
   const std::vector<int32_t> vertex = VertexOfVoxel(*field.geometry);
   const auto point_of = [&](uint64_t stream, int64_t i) {
     const int64_t voxel = static_cast<int64_t>(
         RandomIndex(options.seed, stream, static_cast<uint64_t>(i), static_cast<uint64_t>(n)));
-    float row[kFeatureStride];
-    FillFeatures(field, network.data().position_scale, voxel, vertex[voxel], row);
-    VectorXd point(kNetworkInputs);
-    for (int k = 0; k < kNetworkInputs; ++k) point(k) = row[k];
+    float values[kLargestRow.stride()];
+    FillFeatures(field, network.data().position_scale, voxel, vertex[voxel], values);
+    VectorXd point(inputs);
+    for (int k = 0; k < inputs; ++k) point(k) = values[k];
     return point;
   };
 
   constexpr int64_t kChunk = 1000;
   for (int64_t begin = 0; begin < options.pairs; begin += kChunk) {
     const int64_t count = std::min(kChunk, options.pairs - begin);
-    MatrixXd a(kNetworkInputs, count), b(kNetworkInputs, count);
+    MatrixXd a(inputs, count), b(inputs, count);
     for (int64_t i = 0; i < count; ++i) {
       a.col(i) = point_of(1, begin + i);
       b.col(i) = point_of(2, begin + i);
@@ -137,7 +141,7 @@ LocalLipschitz MeasureLocalLipschitz(const LipschitzNetwork& network,
   std::vector<std::pair<double, VectorXd>> steepest;
   for (int64_t i = 0; i < options.jacobians; ++i) {
     const VectorXd point = point_of(3, i);
-    VectorXd direction = VectorXd::Ones(kNetworkInputs).normalized();
+    VectorXd direction = VectorXd::Ones(inputs).normalized();
     steepest.emplace_back(f.NormAt(point, &direction), point);
   }
   std::ranges::sort(steepest, [](const auto& a, const auto& b) { return a.first > b.first; });
@@ -148,8 +152,8 @@ LocalLipschitz MeasureLocalLipschitz(const LipschitzNetwork& network,
       return SpectralNorm({m.data(), m.data() + m.size()}, static_cast<int>(m.rows()),
                           static_cast<int>(m.cols()));
     };
-    result.along_coefficients = norm(jacobian.leftCols(kNetworkSh));
-    result.along_position = norm(jacobian.rightCols(kNetworkInputs - kNetworkSh));
+    result.along_coefficients = norm(jacobian.leftCols(row.sh()));
+    result.along_position = norm(jacobian.rightCols(inputs - row.sh()));
   }
 
   // Gradient ascent: finite differences of the norm, steps of shrinking length along them.
@@ -158,13 +162,13 @@ LocalLipschitz MeasureLocalLipschitz(const LipschitzNetwork& network,
   for (size_t s = 0; s < starts; ++s) {
     VectorXd point = steepest[s].second;
     double best = steepest[s].first, step = 0.2;
-    VectorXd direction = VectorXd::Ones(kNetworkInputs).normalized();
+    VectorXd direction = VectorXd::Ones(inputs).normalized();
     for (int i = 0; i < options.ascent_steps; ++i) {
       f.NormAt(point, &direction);
-      VectorXd gradient(kNetworkInputs);
+      VectorXd gradient(inputs);
       const VectorXd frozen = direction;
       constexpr double kH = 1e-5;
-      for (int k = 0; k < kNetworkInputs; ++k) {
+      for (int k = 0; k < inputs; ++k) {
         VectorXd plus = point, minus = point;
         plus(k) += kH, minus(k) -= kH;
         gradient(k) = (f.Along(plus, frozen).norm() - f.Along(minus, frozen).norm()) / (2 * kH);
@@ -181,7 +185,7 @@ LocalLipschitz MeasureLocalLipschitz(const LipschitzNetwork& network,
     }
     result.ascent = std::max(result.ascent, best);
     f.NormAt(point, &direction);
-    MatrixXd ends(kNetworkInputs, 2);
+    MatrixXd ends(inputs, 2);
     ends << point - 0.5 * options.min_distance * direction,
         point + 0.5 * options.min_distance * direction;
     const MatrixXd images = f.Forward(ends);

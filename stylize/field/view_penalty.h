@@ -18,9 +18,6 @@
 
 namespace regrade {
 
-// Where rows of coefficients [32] keep the three masses m_v,c while gradients are added up.
-inline constexpr int kMassLane = 27;
-
 // Of one coefficient k >= 1, without lambda_view / (3 Q).
 template <typename T>
 struct ViewPenalty {

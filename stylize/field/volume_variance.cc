@@ -11,8 +11,6 @@
 namespace regrade {
 namespace {
 
-constexpr double kGammaNorm = 0.84628437532163443;  // sqrt(9 / (4 pi))
-
 constexpr int32_t kBackground = -1;
 
 struct Atom {
@@ -108,12 +106,13 @@ class Observer {
   double Bound(const Seen& a, const Seen& b) const {
     double changed = 0, mean[3 * kMaxBasis] = {};
     const bool splats = source_.geometry->splats.on();
+    const double gamma_norm = std::sqrt(basis_) * kSh0;
     Couple(a, b, [&](const Atom& one, const Atom& other, double moved) {
       if (one.voxel == kBackground || other.voxel == kBackground) {
         changed += moved * Norm(ResidualColor(one) - ResidualColor(other));
         return;
       }
-      changed += moved * kGammaNorm * residual_bound_ * Distance(one.voxel, other.voxel);
+      changed += moved * gamma_norm * residual_bound_ * Distance(one.voxel, other.voxel);
       double g[3 * kMaxBasis];
       Residual(other.voxel, g);
       if (splats) changed += moved * Turn(one.direction, other.direction) * NormOf(g);
@@ -183,11 +182,11 @@ class Observer {
   }
 
   double Distance(int32_t one, int32_t other) const {
-    float x[kFeatureStride], y[kFeatureStride];
+    float x[kLargestRow.stride()], y[kLargestRow.stride()];
     FillFeatures(source_, position_scale_, one, vertex_[one], x);
     FillFeatures(source_, position_scale_, other, vertex_[other], y);
     double sum = 0;
-    for (int i = 0; i < kNetworkInputs; ++i) {
+    for (int i = 0; i < RowOf(basis_).inputs(); ++i) {
       const double d = static_cast<double>(x[i]) - static_cast<double>(y[i]);
       sum += d * d;
     }

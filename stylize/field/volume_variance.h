@@ -10,7 +10,7 @@
 // Gamma_0 (Lemma 2), and o cancels. What g adds is (E_1 g - E_2 g) Gamma_1 + E_2 g (Gamma_1 -
 // Gamma_2); for any coupling pi of mu_1 and mu_2 the first is sum pi_jk (g_j - g_k) Gamma_1, at
 // most |Gamma| K_g sum pi_jk |x_j - x_k|. Here pi joins the rays' voxels in the order in which
-// light meets them, so the sum is W1's upper bound. |Gamma|^2 = 9 / (4 pi) for every direction.
+// light meets them, so the sum is W1's upper bound. |Gamma|^2 = B / (4 pi) for every direction.
 // Splats have directions d_rj of their own, see EQ(splat-color): in place of the last term is
 //   sum pi_jk |g_k| |Gamma(d_1j) - Gamma(d_2k)|,
 // to which a splat that both rays of one camera see adds nothing. Where a ray transmits light,

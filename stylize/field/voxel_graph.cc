@@ -49,10 +49,11 @@ std::vector<Vec3f> SplatPositions(const RadianceField& field) {
   const float longest = std::max({radius.x, radius.y, radius.z});
   std::vector<Vec3f> positions;
   for (int64_t v = 0; v < field.geometry->num_voxels(); ++v) {
-    float row[kFeatureStride];
+    float row[kLargestRow.stride()];
     FillFeatures(field, 1, v, static_cast<int32_t>(v), row);
     Vec3f& position = positions.emplace_back();
-    for (int a = 0; a < 3; ++a) position[a] = row[kNetworkSh + a] * radius[a] / longest;
+    for (int a = 0; a < 3; ++a)
+      position[a] = row[RowOf(field.appearance.basis).sh() + a] * radius[a] / longest;
   }
   return positions;
 }

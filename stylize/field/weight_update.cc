@@ -22,7 +22,7 @@ bool UpdateWeights(const WeightUpdate& update, int64_t step, std::vector<double>
   for (int l = 0; l < kNetworkLayers; ++l) {
     if (!update.options.hidden_bias && l + 1 < kNetworkLayers)
       std::fill_n(gradient->begin() + (network->bias(l) - network->weight(0)),
-                  LipschitzNetwork::Outputs(l), 0.0);
+                  network->Outputs(l), 0.0);
     double& d_k = (*gradient)[&network->k(l) - network->weight(0)];
     d_k = update.NormGradient(network->k(l), d_k);
   }

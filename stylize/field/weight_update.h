@@ -95,7 +95,7 @@ double FixedBoundFactor(const LipschitzNetworkData& data);
 // Shrinks all K_i by the same factor until the residual's bound is within its limit.
 void LimitBound(const WeightUpdate& update, LipschitzNetwork* network);
 
-// Step `step`, counted from 0, along `gradient` [LipschitzNetwork::NumParameters()], to which
+// Step `step`, counted from 0, along `gradient` [network->NumParameters()], to which
 // the regularisation is added. False if the gradient is not finite: then nothing changes but
 // adam->rejected.
 bool UpdateWeights(const WeightUpdate& update, int64_t step, std::vector<double>* gradient,

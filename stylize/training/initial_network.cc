@@ -56,7 +56,7 @@ void UseWeightsNorms(LipschitzNetwork* network) {
 void InitializeAsSiren(const std::string& start, uint64_t seed, LipschitzNetwork* network) {
   constexpr double kOmega = 30;
   for (int l = 0; l < kNetworkLayers; ++l) {
-    const double n = LipschitzNetwork::Inputs(l);
+    const double n = network->Inputs(l);
     double range = std::sqrt(6 / n), bias = kOmega / std::sqrt(n);
     if (l == 0 && start != "siren-even") range = kOmega / n;
     if (l == kLast) {
@@ -66,7 +66,7 @@ void InitializeAsSiren(const std::string& start, uint64_t seed, LipschitzNetwork
     const int64_t weights = network->bias(l) - network->weight(l);
     for (int64_t i = 0; i < weights; ++i)
       network->weight(l)[i] = static_cast<float>(range * Uniform(seed, StreamOf(l, 0), i));
-    for (int o = 0; o < LipschitzNetwork::Outputs(l); ++o)
+    for (int o = 0; o < network->Outputs(l); ++o)
       network->bias(l)[o] = static_cast<float>(bias * Uniform(seed, StreamOf(l, 1), o));
   }
   UseWeightsNorms(network);
@@ -77,7 +77,7 @@ void InitializeAsSiren(const std::string& start, uint64_t seed, LipschitzNetwork
 void InitializeAsPyTorch(uint64_t seed, LipschitzNetwork* network) {
   for (int l = 0; l < kNetworkLayers; ++l) {
     const int64_t size = &network->k(l) - network->weight(l);
-    const double range = 1 / std::sqrt(static_cast<double>(LipschitzNetwork::Inputs(l)));
+    const double range = 1 / std::sqrt(static_cast<double>(network->Inputs(l)));
     for (int64_t i = 0; i < size; ++i)
       network->weight(l)[i] = static_cast<float>(range * Uniform(seed, StreamOf(l, 0), i));
   }
@@ -91,7 +91,7 @@ void InitializeWithoutMap(const std::string& start, uint64_t seed, LipschitzNetw
   REGRADE_CHECK(start == "orthogonal" || start == "identity");
   constexpr float kSmallBias = 0.05f, kHalf = 0.5f;
   for (int l = 0; l < kNetworkLayers; ++l) {
-    const int outputs = LipschitzNetwork::Outputs(l), inputs = LipschitzNetwork::Inputs(l);
+    const int outputs = network->Outputs(l), inputs = network->Inputs(l);
     const auto weight = [&](int o, int i) -> float& {
       return network->weight(l)[static_cast<int64_t>(o) * inputs + i];
     };
@@ -102,7 +102,7 @@ void InitializeWithoutMap(const std::string& start, uint64_t seed, LipschitzNetw
         for (int i = 0; i < inputs; ++i) weight(o, i) = static_cast<float>(w(o, i));
       continue;
     }
-    const int through = std::min({outputs, inputs, kNetworkInputs});
+    const int through = std::min({outputs, inputs, network->Inputs(0)});
     const float gain = l == 0 ? kHalf : l == kLast ? 1 / kHalf : 1;
     for (int o = 0; o < through; ++o)
       for (int i = 0; i < inputs; ++i) weight(o, i) = o == i ? gain : 0;
@@ -116,7 +116,7 @@ void InitializeResidual(uint64_t seed, LipschitzNetwork* network) {
   // range.
   constexpr double kHiddenK = 1.2, kFirstBias = M_PI, kOtherBias = 0.3;
   for (int l = 0; l < kLast; ++l) {
-    const int outputs = LipschitzNetwork::Outputs(l), inputs = LipschitzNetwork::Inputs(l);
+    const int outputs = network->Outputs(l), inputs = network->Inputs(l);
     const Eigen::MatrixXd w = RandomIsometry(outputs, inputs, seed, StreamOf(l, 0));
     for (int o = 0; o < outputs; ++o) {
       for (int i = 0; i < inputs; ++i)
@@ -168,10 +168,11 @@ void SolveOutputLayer(const StyleLoss::HiddenSums& sums, double budget,
     std::vector<double> rows(static_cast<size_t>(w.size()));
     Eigen::Map<RowMajor>(rows.data(), w.rows(), w.cols()) = w;
     if (!(hidden_bound * SpectralNorm(rows, kMlpHidden, 3) <= budget)) continue;
+    const int basis = network->row().basis;
     for (int c = 0; c < 3; ++c) {
       for (int i = 0; i < kMlpHidden; ++i)
-        network->weight(kLast)[c * 9 * kMlpHidden + i] = static_cast<float>(w(i, c));
-      network->bias(kLast)[c * 9] = static_cast<float>(solution(kMlpHidden, c));
+        network->weight(kLast)[c * basis * kMlpHidden + i] = static_cast<float>(w(i, c));
+      network->bias(kLast)[c * basis] = static_cast<float>(solution(kMlpHidden, c));
     }
     break;
   }

@@ -13,8 +13,8 @@
 
 namespace regrade {
 
-// Harmonics a channel of a restyled field: a 2D method that maps each view by itself needs
-// directions, also where the scene's own colours have none. See PadShBasis.
+// The least harmonics a channel of a restyled field: a 2D method that maps each view by itself
+// needs directions, also where the scene's own colours have none. See PadShBasis.
 inline constexpr int kStyledBasis = 9;
 
 struct RestyleRequest {
@@ -34,7 +34,7 @@ struct RestyleHooks {
 };
 
 struct RestyledField {
-  RadianceField source;  // with kStyledBasis
+  RadianceField source;  // padded to kStyledBasis
   RadianceField styled;
   TrainNetworkResult trained;
   std::vector<std::string> notices;  // of the scene-wide map

@@ -39,7 +39,7 @@ StepResult HostSteps::Make(const WeightUpdate& update, const StepRequest& reques
     for (int i = 0; i < update.options.norm_steps; ++i) network->StepNorms();
     if (result.made == 0 && request.norms_lag && request.norms_lag(*network))
       network->WarmUpNorms();
-    std::vector<double> gradient(LipschitzNetwork::NumParameters(), 0.0);
+    std::vector<double> gradient(network->NumParameters(), 0.0);
     result.last = loss->Run(*network, batch, &gradient);
     result.touched_voxels += static_cast<double>(result.last.touched_voxels);
     const int64_t step = request.first + result.made++;

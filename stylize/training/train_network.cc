@@ -23,9 +23,7 @@ std::string FirstNonFinite(const LipschitzNetwork& network, const std::vector<do
                            double loss) {
   for (int l = 0; l < kNetworkLayers; ++l) {
     const int64_t first = network.weight(l) - network.weight(0);
-    const int64_t size =
-        static_cast<int64_t>(LipschitzNetwork::Outputs(l)) * (LipschitzNetwork::Inputs(l) + 1) +
-        1;
+    const int64_t size = static_cast<int64_t>(network.Outputs(l)) * (network.Inputs(l) + 1) + 1;
     for (int64_t i = first; i < first + size; ++i) {
       const std::string layer = "layer " + std::to_string(l + 1);
       if (!std::isfinite(network.data().parameters[i])) return "the weights of " + layer;
@@ -48,7 +46,8 @@ class Training {
         loss_options_(LossOptions(options, march)),
         engine_(*engine),
         // A fixed sample of the training pixels chooses the base and measures the gain.
-        sample_(SampleStyleRays(views, 16384, 8, options.seed, kSampleStream)) {
+        sample_(SampleStyleRays(views, 16384, 8, options.seed, kSampleStream)),
+        network_(RowOf(field.appearance.basis).basis) {
     bool capped = false;
     const double target = LayerTarget(scene_map.k_est, kNetworkLayers, &capped);
     update_.options = options;
@@ -107,7 +106,7 @@ ColorMap Training::BetterMap(double* mse) {
   ColorMap better = scene_map_.map;
   *mse = std::numeric_limits<double>::infinity();
   const auto consider = [&](const ColorMap& map) {
-    const double error = LossOfSample(NetworkOfMap(map)).Mse();
+    const double error = LossOfSample(NetworkOfMap(map, network_.row().basis)).Mse();
     if (error < *mse) *mse = error, better = map;
   };
   if (options_.base != "least-squares") consider(scene_map_.map);
@@ -148,7 +147,7 @@ void Training::Start(int64_t bad_pixels) {
   }
   if (!options_.hidden_bias)
     for (int l = 0; l + 1 < kNetworkLayers; ++l)
-      std::fill_n(network_.bias(l), LipschitzNetwork::Outputs(l), 0.0f);
+      std::fill_n(network_.bias(l), network_.Outputs(l), 0.0f);
   if (!options_.settle_norms) network_.RestartNorms();
   if (options_.spectral_normalisation)
     for (int l = 0; l < kNetworkLayers; ++l) network_.k(l) = 1;

@@ -95,15 +95,19 @@ TEST_F(DeviceSplatFit, PopulationChangesAsOnTheHost) {
 // that hardly counts, may go either way: most values agree, and pictures do.
 TEST_F(DeviceSplatFit, StepsAreThoseOfTheHost) {
   fit_.steps = 15;
-  std::vector<Image> pictures;
-  SplatFitHooks hooks;
-  hooks.measure = [&](SplatEngine* engine) {
-    pictures.push_back(engine->Render(cameras_[0]).color);
-  };
-  const Splats host = FitSplats(views_, box_, fit_, hooks, Backend::kCpu).splats;
-  const Splats device = FitSplats(views_, box_, fit_, hooks, Backend::kCuda).splats;
-  EXPECT_EQ(device.count(), host.count());
-  EXPECT_GT(testing::Psnr(pictures[1], pictures[0]), 35);
+  for (const int degree : {1, 3}) {
+    fit_.sh_degree = degree;
+    std::vector<Image> pictures;
+    SplatFitHooks hooks;
+    hooks.measure = [&](SplatEngine* engine) {
+      pictures.push_back(engine->Render(cameras_[0]).color);
+    };
+    const Splats host = FitSplats(views_, box_, fit_, hooks, Backend::kCpu).splats;
+    const Splats device = FitSplats(views_, box_, fit_, hooks, Backend::kCuda).splats;
+    EXPECT_EQ(device.count(), host.count());
+    EXPECT_EQ(device.basis, host.basis);
+    EXPECT_GT(testing::Psnr(pictures[1], pictures[0]), 35) << degree;
+  }
 }
 
 TEST_F(DeviceSplatFit, ReproducesAHeldOutViewWithTheSameBitsEachTime) {

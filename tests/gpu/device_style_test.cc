@@ -54,47 +54,49 @@ bool HasKink(const std::string& activation) {
 }
 
 // n rows through the network, forward and adjoint, for each activation and precision.
-void CheckMlp(int64_t n) {
+void CheckMlp(int64_t n, int basis) {
+  const NetworkRow shape{basis};
+  const int stride = shape.stride();
   for (const char* activation : {"sine", "relu", "leaky-relu", "sigmoid", "tanh"}) {
-    LipschitzNetwork random = RandomNetwork(17);
+    LipschitzNetwork random = RandomNetwork(17, 1.3, basis);
     random.data().activation = activation;
     const DenseNetwork<float> network = random.Effective<float>();
     const DenseNetwork<double> exact = InDouble(network);
-    Buffer<float> input(n * kMlpEndLanes), d_output(input.size());
+    Buffer<float> input(n * stride), d_output(input.size());
     for (int64_t i = 0; i < input.size(); ++i) {
-      const int64_t lane = i % kMlpEndLanes;
-      if (lane < kNetworkInputs)
+      const int64_t lane = i % stride;
+      if (lane < shape.inputs())
         input[i] = static_cast<float>(Random(60, static_cast<uint64_t>(i)));
-      if (lane < kNetworkSh)
+      if (lane < shape.sh())
         d_output[i] = static_cast<float>(Random(61, static_cast<uint64_t>(i)));
     }
     const DeviceBuffer<float> x = DeviceBuffer<float>::Of(input, "input"),
                               d_y = DeviceBuffer<float>::Of(d_output, "gradient");
     DenseNetwork<double> expected;
     for (int l = 0; l < kNetworkLayers; ++l)
-      expected.layers.emplace_back(LipschitzNetwork::Outputs(l), LipschitzNetwork::Inputs(l));
-    std::vector<double> outputs(static_cast<size_t>(n * kNetworkSh));
+      expected.layers.emplace_back(random.Outputs(l), random.Inputs(l));
+    std::vector<double> outputs(static_cast<size_t>(n * shape.sh()));
     for (int64_t r = 0; r < n; ++r) {
-      double row[kNetworkInputs], d_row[kNetworkSh];
-      std::copy_n(&input[r * kMlpEndLanes], kNetworkInputs, row);
-      std::copy_n(&d_output[r * kMlpEndLanes], kNetworkSh, d_row);
-      DenseForward(exact, row, &outputs[static_cast<size_t>(r * kNetworkSh)]);
+      double row[kLargestRow.inputs()], d_row[kLargestRow.sh()];
+      std::copy_n(&input[r * stride], shape.inputs(), row);
+      std::copy_n(&d_output[r * stride], shape.sh(), d_row);
+      DenseForward(exact, row, &outputs[static_cast<size_t>(r * shape.sh())]);
       DenseAdjoint(exact, row, d_row, &expected, static_cast<double*>(nullptr));
     }
     for (const Tolerances& tolerances : kTolerances) {
       DeviceMlp mlp(MakeFusedMlp(network));
-      DeviceBuffer<float> y(n * kMlpEndLanes, "output");
+      DeviceBuffer<float> y(n * stride, "output");
       mlp.Forward(tolerances.precision, x.data(), n, y.data());
       const Buffer<float> rows = y.ToHost();
       double off = 0, largest = 0;
       for (int64_t r = 0; r < n; ++r)
-        for (int k = 0; k < kNetworkSh; ++k) {
-          const double value = outputs[static_cast<size_t>(r * kNetworkSh + k)];
-          off = std::max(off, std::abs(rows[r * kMlpEndLanes + k] - value));
+        for (int k = 0; k < shape.sh(); ++k) {
+          const double value = outputs[static_cast<size_t>(r * shape.sh() + k)];
+          off = std::max(off, std::abs(rows[r * stride + k] - value));
           largest = std::max(largest, std::abs(value));
         }
-      const std::string what =
-          std::string(activation) + ", " + std::to_string(n) + " rows, " + tolerances.name;
+      const std::string what = std::string(activation) + ", " + std::to_string(n) +
+                               " rows of " + std::to_string(stride) + ", " + tolerances.name;
       ParityRow("network forward", what, "double, of the largest", off / largest,
                 tolerances.forward);
 
@@ -106,7 +108,7 @@ void CheckMlp(int64_t n) {
         continue;
       DenseNetwork<double> gradient;
       for (int l = 0; l < kNetworkLayers; ++l)
-        gradient.layers.emplace_back(LipschitzNetwork::Outputs(l), LipschitzNetwork::Inputs(l));
+        gradient.layers.emplace_back(random.Outputs(l), random.Inputs(l));
       mlp.TakeGradient(&gradient);
       double gradient_off = 0;
       for (size_t l = 0; l < kNetworkLayers;
@@ -128,12 +130,19 @@ void CheckMlp(int64_t n) {
   }
 }
 
-TEST_F(DeviceStyle, MlpLessThanATile) { CheckMlp(1); }
-TEST_F(DeviceStyle, MlpNoWholeTiles) { CheckMlp(37); }
-TEST_F(DeviceStyle, LargeMlpOfTwoChunks) { CheckMlp(70001); }
+TEST_F(DeviceStyle, MlpLessThanATile) { CheckMlp(1, 9); }
+TEST_F(DeviceStyle, MlpNoWholeTiles) { CheckMlp(37, 9); }
+TEST_F(DeviceStyle, LargeMlpOfTwoChunks) { CheckMlp(70001, 9); }
+TEST_F(DeviceStyle, WideMlpLessThanATile) { CheckMlp(1, 16); }
+TEST_F(DeviceStyle, LargeWideMlpOfTwoChunks) { CheckMlp(70001, 16); }
 
 enum class Scene { kBall, kBallBeforeLayers, kCells, kSplats };
 constexpr const char* kSceneNames[] = {"", ", layers", ", cells", ", splats"};
+
+// Of splats the largest has degree 3.
+std::vector<int> HarmonicsOf(Scene scene) {
+  return scene == Scene::kSplats ? std::vector<int>{16, 9, 4, 1} : std::vector<int>{9, 4, 1};
+}
 
 // A ball of n voxels a side, one in front of background layers, cells of three sizes, or a ball
 // of n^3 / 2 splats.
@@ -148,10 +157,10 @@ RadianceField FieldOf(Scene scene, int n, int basis) {
 // Loss, gradient and counts of the device path against the CPU's, which other tests compare
 // with Algorithm 1 in double.
 void CheckLossAndGradient(int side, Scene scene) {
-  for (const int basis : {9, 4, 1}) {
+  for (const int basis : HarmonicsOf(scene)) {
     const RadianceField field = FieldOf(scene, 14, basis);
     const DeviceStyleField on_card = UploadStyleField(field);
-    LipschitzNetwork network = RandomNetwork(91);
+    LipschitzNetwork network = RandomNetwork(91, 1.3, RowOf(basis).basis);
     network.data().has_base = true;
     network.data().base = SomeMap();
     StyleRays batch = SomeRays(3, side);
@@ -164,7 +173,7 @@ void CheckLossAndGradient(int side, Scene scene) {
                                        .every_voxel = every_voxel};
       GradientAggregation on_cpu(field, options);
       const std::unique_ptr<StyleLoss> on_device = MakeDeviceStyleLoss(&on_card, options);
-      const size_t size = static_cast<size_t>(LipschitzNetwork::NumParameters());
+      const size_t size = static_cast<size_t>(network.NumParameters());
       std::vector<double> expected(size), gradient(size);
       const double should_be = on_cpu.Run(network, batch, nullptr).loss;
       const AggregationResult should = on_cpu.Run(network, batch, &expected);
@@ -205,15 +214,14 @@ TEST_F(DeviceStyle, LargeLossAndGradientOfTwoBandsBeforeLayers) {
 // With the rays in the opposite order samples arrive in another one, and the bands hold others.
 // Against float sums: TF32 rounds some factors whose last bit differs to the other side, by
 // 1e-3 each, and few do.
-void CheckExactSums(int side, Scene scene) {
-  const RadianceField field = FieldOf(scene, 40, 9);
+void CheckExactSums(int side, Scene scene, int basis = 9) {
+  const RadianceField field = FieldOf(scene, 40, basis);
   const DeviceStyleField on_card = UploadStyleField(field);
-  const LipschitzNetwork network = RandomNetwork(33);
+  const LipschitzNetwork network = RandomNetwork(33, 1.3, RowOf(basis).basis);
   StyleRays batch = SomeRays(3, side);
   struct Run {
     AggregationResult result;
-    std::vector<double> gradient =
-        std::vector<double>(static_cast<size_t>(LipschitzNetwork::NumParameters()));
+    std::vector<double> gradient;
     StyleLoss::HiddenSums sums;
   };
   Run runs[3];
@@ -221,6 +229,7 @@ void CheckExactSums(int side, Scene scene) {
     const AggregationOptions options{
         .min_weight = 1e-4f, .view_weight = 0.7, .exact_sums = &run != &runs[2]};
     const std::unique_ptr<StyleLoss> loss = MakeDeviceStyleLoss(&on_card, options);
+    run.gradient.resize(static_cast<size_t>(network.NumParameters()));
     run.result = loss->Run(network, batch, &run.gradient);
     run.sums = loss->SumHidden(network, batch);
     std::reverse(batch.rays.begin(), batch.rays.end());
@@ -252,16 +261,17 @@ TEST_F(DeviceStyle, H68_ExactSumsOfCellsAreTheSameBitsInAnyOrder) {
 }
 TEST_F(DeviceStyle, H68_ExactSumsOfSplatsAreTheSameBitsInAnyOrder) {
   CheckExactSums(50, Scene::kSplats);
+  CheckExactSums(50, Scene::kSplats, 16);
 }
 TEST_F(DeviceStyle, H68_LargeExactSumsAreTheSameBitsInAnyOrder) {
   CheckExactSums(150, Scene::kBallBeforeLayers);
 }
 
-void CheckHiddenSums(Scene scene) {
-  const RadianceField field = FieldOf(scene, 12, 9);
+void CheckHiddenSums(Scene scene, int basis = 9) {
+  const RadianceField field = FieldOf(scene, 12, basis);
   const DeviceStyleField on_card = UploadStyleField(field);
   const StyleRays batch = SomeRays(2, 20);
-  const LipschitzNetwork network = RandomNetwork(33);
+  const LipschitzNetwork network = RandomNetwork(33, 1.3, RowOf(basis).basis);
   const AggregationOptions options{.max_transmittance = 0.5f};
   const auto should = GradientAggregation(field, options).SumHidden(network, batch);
   const auto is = MakeDeviceStyleLoss(&on_card, options)->SumHidden(network, batch);
@@ -272,21 +282,25 @@ void CheckHiddenSums(Scene scene) {
     off = std::max(off, std::abs(double{is.hidden[i]} - should.hidden[i]));
   for (size_t i = 0; i < is.missing.size(); ++i)
     off = std::max(off, std::abs(double{is.missing[i]} - should.missing[i]));
-  ParityRow("hidden sums", std::string("basis 9") + kSceneNames[static_cast<int>(scene)], "CPU",
-            off, 5e-5);
+  ParityRow("hidden sums",
+            "basis " + std::to_string(basis) + kSceneNames[static_cast<int>(scene)], "CPU", off,
+            5e-5);
 }
 
 TEST_F(DeviceStyle, HiddenSums) { CheckHiddenSums(Scene::kBall); }
 TEST_F(DeviceStyle, HiddenSumsBeforeLayers) { CheckHiddenSums(Scene::kBallBeforeLayers); }
 TEST_F(DeviceStyle, HiddenSumsOfCells) { CheckHiddenSums(Scene::kCells); }
-TEST_F(DeviceStyle, HiddenSumsOfSplats) { CheckHiddenSums(Scene::kSplats); }
+TEST_F(DeviceStyle, HiddenSumsOfSplats) {
+  CheckHiddenSums(Scene::kSplats);
+  CheckHiddenSums(Scene::kSplats, 16);
+}
 
 void CheckRestyle(Scene scene) {
-  for (const int basis : {9, 4, 1}) {
+  for (const int basis : HarmonicsOf(scene)) {
     const std::string what =
         "basis " + std::to_string(basis) + kSceneNames[static_cast<int>(scene)];
     const RadianceField field = FieldOf(scene, 13, basis);
-    LipschitzNetwork network = RandomNetwork(92);
+    LipschitzNetwork network = RandomNetwork(92, 1.3, RowOf(basis).basis);
     network.data().has_base = true;
     network.data().base = SomeMap();
     DeviceStyleField on_card = UploadStyleField(field);

@@ -188,7 +188,8 @@ DenseNetwork<T> ZeroLike(const DenseNetwork<float>& network) {
   return zero;
 }
 
-const std::vector<int> kPaperSizes = {30, 64, 64, 64, 64, 64, 27};
+const std::vector<int> kPaperSizes = {30, 64, 64, 64, 64, 64, 27},
+                       kWideSizes = {51, 64, 64, 64, 64, 64, 48};
 constexpr Activation kAll[] = {Activation::kSine, Activation::kRelu, Activation::kLeakyRelu,
                                Activation::kSigmoid, Activation::kTanh};
 
@@ -252,13 +253,19 @@ TEST(FusedMlp, H45_SineAndCosine) {
   }
 }
 
-TEST(FusedMlp, AgreesWithPlainDouble) {
+// Of rows of 32 lanes and of 64.
+class FusedMlpOf : public ::testing::TestWithParam<std::vector<int>> {};
+INSTANTIATE_TEST_SUITE_P(Sizes, FusedMlpOf, ::testing::Values(kPaperSizes, kWideSizes));
+
+TEST_P(FusedMlpOf, AgreesWithPlainDouble) {
   constexpr int kRows = 1003;  // ends inside a block
+  const std::vector<int>& sizes = GetParam();
+  const int inputs = sizes.front(), outputs = sizes.back(), lanes = MlpEndLanes(inputs);
   for (const Activation activation : kAll)
     for (const char* name : {"baseline", "avx2", "avx512"}) {
       if (FusedMlpFor(name) == nullptr) continue;
       UseFusedMlp(name);
-      const DenseNetwork<float> network = RandomNetwork<float>(activation, kPaperSizes);
+      const DenseNetwork<float> network = RandomNetwork<float>(activation, sizes);
       DenseNetwork<double> reference;
       reference.activation = activation;
       for (const auto& layer : network.layers) {
@@ -267,10 +274,10 @@ TEST(FusedMlp, AgreesWithPlainDouble) {
         std::copy(layer.weight.begin(), layer.weight.end(), copy.weight.begin());
         std::copy(layer.bias.begin(), layer.bias.end(), copy.bias.begin());
       }
-      std::vector<float> x(kRows * kMlpEndLanes), y(x.size()), d_y(x.size());
+      std::vector<float> x(kRows * lanes), y(x.size()), d_y(x.size());
       for (int r = 0; r < kRows; ++r) {
-        for (int i = 0; i < 30; ++i) x[r * kMlpEndLanes + i] = Random(30, r * 30 + i);
-        for (int i = 0; i < 27; ++i) d_y[r * kMlpEndLanes + i] = Random(31, r * 27 + i);
+        for (int i = 0; i < inputs; ++i) x[r * lanes + i] = Random(30, r * inputs + i);
+        for (int i = 0; i < outputs; ++i) d_y[r * lanes + i] = Random(31, r * outputs + i);
       }
       const FusedMlp mlp = MakeFusedMlp(network);
       FusedForward(mlp, x.data(), kRows, y.data());
@@ -280,14 +287,14 @@ TEST(FusedMlp, AgreesWithPlainDouble) {
       DenseNetwork<double> expected = ZeroLike<double>(network);
       double worst = 0, largest = 0;
       for (int r = 0; r < kRows; ++r) {
-        std::vector<double> xd(30), yd(27), d_yd(27);
-        std::copy_n(&x[r * kMlpEndLanes], 30, xd.begin());
-        std::copy_n(&d_y[r * kMlpEndLanes], 27, d_yd.begin());
+        std::vector<double> xd(inputs), yd(outputs), d_yd(outputs);
+        std::copy_n(&x[r * lanes], inputs, xd.begin());
+        std::copy_n(&d_y[r * lanes], outputs, d_yd.begin());
         DenseForward(reference, xd.data(), yd.data());
         DenseAdjoint(reference, xd.data(), d_yd.data(), &expected,
                      static_cast<double*>(nullptr));
-        for (int i = 0; i < 27; ++i) {
-          worst = std::max(worst, std::abs(yd[i] - y[r * kMlpEndLanes + i]));
+        for (int i = 0; i < outputs; ++i) {
+          worst = std::max(worst, std::abs(yd[i] - y[r * lanes + i]));
           largest = std::max(largest, std::abs(yd[i]));
         }
       }
@@ -318,7 +325,7 @@ TEST(FusedMlp, ThreadsDoNotChangeABit) {
   constexpr int kRows = 20000;
   const DenseNetwork<float> network = RandomNetwork<float>(Activation::kSine, kPaperSizes);
   const FusedMlp mlp = MakeFusedMlp(network);
-  std::vector<float> x(kRows * kMlpEndLanes), y[2];
+  std::vector<float> x(kRows * mlp.ends), y[2];
   for (size_t i = 0; i < x.size(); ++i) x[i] = i % 32 < 27 ? Random(32, i) : 0;
   DenseNetwork<double> gradient[2] = {ZeroLike<double>(network), ZeroLike<double>(network)};
   for (int t = 0; t < 2; ++t) {

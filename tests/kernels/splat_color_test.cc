@@ -48,7 +48,7 @@ TEST(SphericalHarmonics, SixteenFunctionsAreOrthonormal) {
     for (int j = 0; j < kAround; ++j) {
       const double angle = 2 * M_PI * (j + 0.3) / kAround, r = std::sqrt(1 - z[i] * z[i]);
       double gamma[16];
-      ShBasisTo3(16, Vec3d{r * std::cos(angle), r * std::sin(angle), z[i]}, gamma);
+      ShBasis(16, Vec3d{r * std::cos(angle), r * std::sin(angle), z[i]}, gamma);
       for (int a = 0; a < 16; ++a)
         for (int b = 0; b < 16; ++b)
           gram[a][b] += gamma[a] * gamma[b] * weight[i] * 2 * M_PI / kAround;
@@ -70,7 +70,7 @@ TEST(SphericalHarmonics, TheNormOfTheBasisIsConstant) {
     const double exact = (degree + 1) / (2 * std::sqrt(M_PI));
     for (uint64_t i = 0; i < 2000; ++i) {
       double gamma[16], square = 0;
-      ShBasisTo3(basis, RandomDirection(i), gamma);
+      ShBasis(basis, RandomDirection(i), gamma);
       for (int k = 0; k < basis; ++k) square += gamma[k] * gamma[k];
       ASSERT_NEAR(std::sqrt(square), exact,
                   testing::RecordDigits("norm of the basis", testing::Computed::kDouble,
@@ -78,16 +78,6 @@ TEST(SphericalHarmonics, TheNormOfTheBasisIsConstant) {
     }
   }
   EXPECT_NEAR(4 / (2 * std::sqrt(M_PI)), 1.128, 5e-4);
-}
-
-// The first nine functions of splats are the fields', to the bit.
-TEST(SphericalHarmonics, SplatsAndFieldsShareTheirBasis) {
-  for (uint64_t i = 0; i < 100; ++i) {
-    double nine[9], sixteen[16];
-    ShBasis(9, RandomDirection(i), nine);
-    ShBasisTo3(16, RandomDirection(i), sixteen);
-    for (int k = 0; k < 9; ++k) ASSERT_EQ(nine[k], sixteen[k]);
-  }
 }
 
 // By the coefficients and by the mean, through the direction's normalisation.
@@ -138,8 +128,8 @@ TEST(RotateHarmonics, ATurnedFunctionIsTheFunctionOfTurnedDirections) {
   for (uint64_t i = 0; i < 20; ++i) {
     const Vec3d direction = RandomDirection(i);
     double turned[16], own[16];
-    ShBasisTo3(16, turn * direction, turned);
-    ShBasisTo3(16, direction, own);
+    ShBasis(16, turn * direction, turned);
+    ShBasis(16, direction, own);
     // Row by row: Gamma_j(R^T d) = sum_i M_ij Gamma_i(d), at d = R direction.
     for (size_t j = 0; j < 16; ++j) {
       double sum = 0;

@@ -24,8 +24,8 @@ float Random(uint64_t stream, size_t i) {
 }
 
 // All values differ, so that exchanged ones are detected.
-StoredNetwork SmallNetwork() {
-  LipschitzNetworkData data = LipschitzNetwork().data();
+StoredNetwork SmallNetwork(int basis = 9) {
+  LipschitzNetworkData data = LipschitzNetwork(basis).data();
   for (size_t i = 0; i < data.parameters.size(); ++i) data.parameters[i] = Random(1, i);
   for (size_t i = 0; i < data.singular_vectors.size(); ++i)
     data.singular_vectors[i] = Random(2, i);
@@ -49,12 +49,16 @@ bool SameBits(const std::vector<float>& a, const std::vector<float>& b) {
   return a.size() == b.size() && std::memcmp(a.data(), b.data(), a.size() * sizeof(float)) == 0;
 }
 
-TEST(NetworkFile, RoundTripKeepsAllBits) {
+class NetworkFileOf : public ::testing::TestWithParam<int> {};
+INSTANTIATE_TEST_SUITE_P(Harmonics, NetworkFileOf, ::testing::Values(9, 16));
+
+TEST_P(NetworkFileOf, RoundTripKeepsAllBits) {
   const TemporaryFolder folder;
-  const StoredNetwork out = SmallNetwork();
+  const StoredNetwork out = SmallNetwork(GetParam());
   WriteNetworkFile(folder / "network.npz", out);
   const StoredNetwork in = ReadNetworkFile(folder / "network.npz");
   const LipschitzNetworkData &a = out.network.data(), &b = in.network.data();
+  EXPECT_EQ(b.basis, GetParam());
   EXPECT_TRUE(SameBits(a.parameters, b.parameters));
   EXPECT_TRUE(SameBits(a.singular_vectors, b.singular_vectors));
   EXPECT_EQ(b.activation, "tanh");
@@ -73,7 +77,7 @@ TEST(NetworkFile, RoundTripKeepsAllBits) {
 
 TEST(NetworkCheckpoint, KeepsBothMaps) {
   TrainingState state;
-  state.network = SmallNetwork().network.data();
+  state.network = SmallNetwork(16).network.data();
   state.linear_map_mse = 1.0 / 7;
   for (int i = 0; i < 3; ++i) {
     for (int j = 0; j < 3; ++j) state.linear_map.matrix(i, j) = 1.0 / (20 + 3 * i + j);
@@ -87,6 +91,7 @@ TEST(NetworkCheckpoint, KeepsBothMaps) {
     EXPECT_EQ(in.offset, out.offset);
   }
   EXPECT_EQ(back->linear_map_mse, state.linear_map_mse);
+  EXPECT_EQ(back->network.basis, 16);
 }
 
 TEST(NetworkFile, ArraysHaveTheirNames) {

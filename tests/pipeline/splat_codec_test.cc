@@ -8,14 +8,17 @@
 #include <numeric>
 #include <vector>
 
+#include "kernels/field/pad_sh_basis.h"
 #include "kernels/render/field_renderer.h"
 #include "kernels/splats/extent.h"
 #include "kernels/splats/splat_field.h"
 #include "pipeline/files/deflate.h"
 #include "pipeline/page/splat_numbers.h"
+#include "pipeline/page/style_codec.h"
 #include "tests/support/expect_error.h"
 #include "tests/support/psnr.h"
 #include "tests/support/small_splats.h"
+#include "tests/support/styled_ball.h"
 
 namespace regrade {
 namespace {
@@ -46,8 +49,29 @@ TEST(SplatCodec, DecodedSplatsRenderAsTheExactOnes) {
 
 // A page has harmonics of degree 2 at most.
 TEST(SplatCodec, HigherHarmonicsAreLeftOut) {
-  const RadianceField decoded = DecodeField(EncodeField(FieldOf(50, 16), kStep));
+  const RadianceField field = FieldOf(800, 16);
+  const RadianceField decoded = DecodeField(EncodeField(field, kStep));
   EXPECT_EQ(decoded.appearance.basis, 9);
+  RadianceField lower = field;
+  lower.appearance = LimitShBasis(field.appearance, 9);
+  EXPECT_GE(testing::Psnr(Picture(lower), Picture(decoded)), 48);
+}
+
+// Its style is that of the colours without them.
+TEST(SplatCodec, AStyleOfDegreeThreeIsAppliedToThePagesHarmonics) {
+  StoredNetwork stored{testing::RandomNetwork(7, 1.1, 16), 1, {}};
+  stored.network.data().has_base = true;
+  stored.network.data().base = testing::SomeMap();
+  RadianceField page = DecodeField(EncodeField(FieldOf(200, 16), kStep));
+  const PageStyle style = EncodeStyle(stored, page, 1);
+  EXPECT_EQ(style.header.At("bound").AsDouble(), stored.network.Bound());
+  RadianceField padded = page;
+  padded.appearance = PadShBasis(std::move(padded.appearance), 16);
+  const Appearance all = ApplyNetwork(stored.network, padded);
+  page.appearance.sh = Buffer<float>(page.appearance.sh.size());
+  for (int64_t i = 0; i < page.appearance.sh.size(); ++i)
+    page.appearance.sh[i] = all.sh[i / 9 * 16 + i % 9];
+  EXPECT_GE(testing::Psnr(Picture(page), Picture(style.styled)), 40);
 }
 
 // EQ(page-splat): half a step of each number at most, for splats far outside, too.

@@ -40,8 +40,11 @@ bool Same(const A& a, const B& b) {
   return std::equal(a.data(), a.data() + a.size(), b.data(), b.data() + b.size());
 }
 
-TEST(SplatField, RendersAsThePlainPicture) {
-  const RadianceField field = SmallSplatField(200, 9);
+class SplatFieldOf : public ::testing::TestWithParam<int> {};
+INSTANTIATE_TEST_SUITE_P(Harmonics, SplatFieldOf, ::testing::Values(9, 16));
+
+TEST_P(SplatFieldOf, RendersAsThePlainPicture) {
+  const RadianceField field = SmallSplatField(200, GetParam());
   const Camera camera = SplatCameraOf(61, 43);
   const RenderedView plain =
       RenderedSplats(RenderSplatsPlain(SplatsOf(field), camera, SplatOptionsOf(field)));
@@ -67,7 +70,7 @@ TEST(SplatField, APairIsTwoViews) {
 
 TEST(SplatField, AFileKeepsMeansAndRoundsTheRestToHalves) {
   const TemporaryFolder folder;
-  for (const int basis : {1, 4, 9}) {
+  for (const int basis : {1, 4, 9, 16}) {
     StoredField out{SmallSplatField(50, basis), {}, {}};
     out.field_from_world.scale = 3;
     WriteFieldFile(folder / "field.npz", out);
@@ -80,11 +83,33 @@ TEST(SplatField, AFileKeepsMeansAndRoundsTheRestToHalves) {
       for (int64_t i = 0; i < (b.*member).size(); ++i)
         ASSERT_EQ((a.*member)[i], FloatFromHalf(HalfFromFloat((b.*member)[i])));
     EXPECT_EQ(in.field.appearance.basis, basis);
+    for (int64_t i = 0; i < in.field.appearance.sh.size(); ++i)
+      ASSERT_EQ(in.field.appearance.sh[i],
+                FloatFromHalf(HalfFromFloat(out.field.appearance.sh[i])));
     EXPECT_EQ(in.field.near_clip, 0.2f);
     EXPECT_EQ(in.field.geometry->frame.radius, kBox.radius);
     EXPECT_EQ(in.field_from_world.scale, 3);
     WriteFieldFile(folder / "again.npz", in);
     EXPECT_EQ(testing::ReadText(folder / "again.npz"), testing::ReadText(folder / "field.npz"));
+  }
+}
+
+// Records of voxels have no room for degree 3.
+TEST(SplatField, VoxelsOfDegreeThreeAreRefused) {
+  RadianceField field;
+  auto geometry = std::make_shared<Geometry>();
+  geometry->frame.resolution = {2, 2, 2};
+  geometry->links.Resize(8);
+  geometry->density.Resize(8);
+  for (int32_t i = 0; i < 8; ++i) geometry->links[i] = i;
+  field.geometry = geometry;
+  for (const int basis : {9, 16}) {
+    field.appearance.basis = basis;
+    field.appearance.sh.Resize(8 * field.appearance.stride());
+    if (basis == 9)
+      Validate(field, "nine");
+    else
+      EXPECT_REGRADE_ERROR(Validate(field, "sixteen"), ExitCode::kInput, "of voxels 1, 4 or 9");
   }
 }
 
@@ -100,9 +125,9 @@ TEST(SplatField, AFileWithAValueThatIsNotFiniteIsRefused) {
 
 TEST(SplatCheckpoint, AStateComesBackBitForBit) {
   SplatFitState state;
-  state.splats = CastSplats<float>(RandomSplats(7, 4, 1));
-  state.first_moment = CastSplats<float>(RandomSplats(7, 4, 2));
-  state.second_moment = CastSplats<float>(RandomSplats(7, 4, 3));
+  state.splats = CastSplats<float>(RandomSplats(7, 16, 1));
+  state.first_moment = CastSplats<float>(RandomSplats(7, 16, 2));
+  state.second_moment = CastSplats<float>(RandomSplats(7, 16, 3));
   state.step = 17;
   state.tally = {1.5, 2.5, 3, 4, 5, 6, 7, {{8, 9.5, 10.5, 11}}};
   const std::string bytes = PackSplatFitState(state, "a note").Joined();
@@ -118,30 +143,34 @@ TEST(SplatCheckpoint, AStateComesBackBitForBit) {
 }
 
 // The file's floats, read by their places, rendered by the same camera in the capture's world.
-TEST(SplatPly, IsThePictureInTheCapturesWorld) {
+TEST_P(SplatFieldOf, APlyIsThePictureInTheCapturesWorld) {
+  const size_t basis = static_cast<size_t>(GetParam()), rest = basis - 1;
   const TemporaryFolder folder;
-  StoredField stored{SmallSplatField(80, 9), {}, {}};
+  StoredField stored{SmallSplatField(80, GetParam()), {}, {}};
   const double turn[4] = {0.8, 0.1, -0.5, 0.3};
   stored.field_from_world = {2.5, RotationOf(turn), {0.3, -0.2, 0.7}};
   WriteSplatPly(folder / "field.ply", stored, "a comment");
   const std::string file = testing::ReadText(folder / "field.ply");
   const size_t begin = file.find("end_header\n") + 11;
   EXPECT_NE(file.find("element vertex 80\n"), std::string::npos);
-  constexpr size_t kFloats = 3 + 3 + 27 + 1 + 3 + 4;
-  ASSERT_EQ(file.size() - begin, 80 * kFloats * sizeof(float));
-  Splats splats(80, 9);
+  const size_t floats = 3 + 3 + 3 * basis + 1 + 3 + 4;
+  ASSERT_EQ(file.size() - begin, 80 * floats * sizeof(float));
+  Splats splats(80, GetParam());
   for (size_t i = 0; i < 80; ++i) {
-    float row[kFloats];
-    std::memcpy(row, file.data() + begin + i * sizeof row, sizeof row);
+    std::vector<float> values(floats);
+    const float* const row = values.data();
+    std::memcpy(values.data(), file.data() + begin + i * floats * sizeof(float),
+                floats * sizeof(float));
+    const float* const after = row + 9 + 3 * rest;
     Splat<float> splat;
     splat.mean = {row[0], row[1], row[2]};
-    splat.opacity_logit = row[33];
-    splat.log_scale = {row[34], row[35], row[36]};
-    std::copy_n(row + 37, 4, splat.quaternion);
+    splat.opacity_logit = after[0];
+    splat.log_scale = {after[1], after[2], after[3]};
+    std::copy_n(after + 4, 4, splat.quaternion);
     splats.Set(static_cast<int64_t>(i), splat);
     for (size_t c = 0; c < 3; ++c) {
-      splats.sh[(3 * i + c) * 9] = row[6 + c];
-      std::copy_n(row + 9 + 8 * c, 8, &splats.sh[(3 * i + c) * 9 + 1]);
+      splats.sh[(3 * i + c) * basis] = row[6 + c];
+      std::copy_n(row + 9 + rest * c, rest, &splats.sh[(3 * i + c) * basis + 1]);
     }
   }
   splats.background = stored.field.background;

@@ -220,6 +220,18 @@ TEST_F(SplatFit, ReproducesAHeldOutView) {
   EXPECT_GT(psnr, testing::Psnr(background, photos_[0]) + 12);
 }
 
+TEST_F(SplatFit, DegreeThreeIsFitted) {
+  fit_.steps = 60;
+  fit_.sh_degree = 3;
+  const Splats splats = FitWith().splats;
+  Validate(splats, "fit");
+  ASSERT_EQ(splats.basis, 16);
+  std::set<int> moved;
+  for (size_t i = 0; i < splats.sh.size(); ++i)
+    if (splats.sh[i] != 0) moved.insert(static_cast<int>(i % 16));
+  EXPECT_EQ(moved.size(), 16u);
+}
+
 TEST_F(SplatFit, SameBitsForAnyThreadCount) {
   fit_.steps = 120;
   const auto with = [&](int n) {

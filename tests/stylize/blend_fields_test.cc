@@ -7,6 +7,7 @@
 #include "tests/support/expect_error.h"
 #include "tests/support/floating_point_traps.h"
 #include "tests/support/record_error.h"
+#include "tests/support/row_of_voxels.h"
 #include "tests/support/styled_ball.h"
 
 namespace regrade {

@@ -11,6 +11,7 @@
 #include "tests/support/algorithm1.h"
 #include "tests/support/cell_field.h"
 #include "tests/support/record_error.h"
+#include "tests/support/row_of_voxels.h"
 #include "tests/support/styled_ball.h"
 
 namespace regrade {
@@ -153,7 +154,7 @@ TEST(CellStyle, GradientEqualsAlgorithm1) {
   LipschitzNetwork network = RandomNetwork(91);
   network.data().has_base = true;
   network.data().base = SomeMap();
-  const size_t size = static_cast<size_t>(LipschitzNetwork::NumParameters());
+  const size_t size = static_cast<size_t>(LipschitzNetwork().NumParameters());
   std::vector<double> gradient(size), expected(size);
   const AggregationResult result =
       GradientAggregation(field, {.view_weight = 0.7}).Run(network, batch, &gradient);
@@ -167,7 +168,7 @@ TEST(CellStyle, GradientEqualsAlgorithm1) {
   }
   DenseNetwork<double> d_effective;
   for (int l = 0; l < kNetworkLayers; ++l)
-    d_effective.layers.emplace_back(LipschitzNetwork::Outputs(l), LipschitzNetwork::Inputs(l));
+    d_effective.layers.emplace_back(network.Outputs(l), network.Inputs(l));
   const double loss =
       Algorithm1<double>(network, field, weights, directions, targets,
                          1 / (3.0 * static_cast<double>(batch.rays.size())), 0.7, &d_effective);

@@ -3,6 +3,7 @@
 #include "kernels/field/background_spheres.h"
 #include "tests/support/algorithm1.h"
 #include "tests/support/record_error.h"
+#include "tests/support/row_of_voxels.h"
 #include "tests/support/small_field.h"
 #include "tests/support/styled_ball.h"
 
@@ -27,7 +28,7 @@ double PlainGradient(const LipschitzNetwork& network, const RadianceField& field
   }
   DenseNetwork<double> d_effective;
   for (int l = 0; l < kNetworkLayers; ++l)
-    d_effective.layers.emplace_back(LipschitzNetwork::Outputs(l), LipschitzNetwork::Inputs(l));
+    d_effective.layers.emplace_back(network.Outputs(l), network.Inputs(l));
   const double loss = Algorithm1<double>(network, field, weights, directions, targets, scale,
                                          view_weight, &d_effective);
   if (gradient != nullptr) network.AddGradient(d_effective, gradient);
@@ -35,7 +36,7 @@ double PlainGradient(const LipschitzNetwork& network, const RadianceField& field
 }
 
 std::vector<double> NoGradient() {
-  return std::vector<double>(static_cast<size_t>(LipschitzNetwork::NumParameters()));
+  return std::vector<double>(static_cast<size_t>(LipschitzNetwork().NumParameters()));
 }
 
 TEST(Algorithm1, H46_GradientAgainstRichardson) {

@@ -1,6 +1,7 @@
 // Where learning a style starts: norms and spread of the initial weights.
 #include "stylize/training/initial_network.h"
 
+#include "tests/support/row_of_voxels.h"
 #include "tests/support/styled_ball.h"
 
 namespace regrade {
@@ -62,7 +63,7 @@ TEST(InitialNetwork, SirenStartsHaveTheirProducts) {
     InitializeWithoutMap(start, 3, &network);
     double product = 1, expected = 1;
     for (int l = 0; l < kNetworkLayers; ++l) {
-      const double inputs = LipschitzNetwork::Inputs(l), outputs = LipschitzNetwork::Outputs(l);
+      const double inputs = network.Inputs(l), outputs = network.Outputs(l);
       float range = 0;
       for (int64_t i = 0; i < network.bias(l) - network.weight(l); ++i)
         range = std::max(range, std::abs(network.weight(l)[i]));

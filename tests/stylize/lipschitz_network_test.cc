@@ -4,6 +4,7 @@
 
 #include "kernels/base/half.h"
 #include "tests/support/record_error.h"
+#include "tests/support/row_of_voxels.h"
 #include "tests/support/steepest_pair.h"
 #include "tests/support/styled_ball.h"
 
@@ -15,18 +16,19 @@ using namespace testing;  // NOLINT: a test
 // --- the certificate
 
 TEST(LipschitzNetwork, H36_NoPairIsSteeperThanTheBound) {
-  for (const char* activation : {"sine", "relu", "leaky-relu", "sigmoid", "tanh"}) {
-    LipschitzNetwork network = RandomNetwork(80);
-    network.data().activation = activation;
-    network.data().has_base = true;
-    network.data().base = SomeMap();
-    const double steepest = SteepestPair(network, 4000);
-    EXPECT_LE(steepest, network.Bound() *
-                            testing::RecordBound("steepest of 5 x 4 000 pairs over the bound",
-                                                 testing::Computed::kDouble,
-                                                 steepest / network.Bound(), 1))
-        << activation;
-  }
+  for (const int basis : {9, 16})
+    for (const char* activation : {"sine", "relu", "leaky-relu", "sigmoid", "tanh"}) {
+      LipschitzNetwork network = RandomNetwork(80, 1.3, basis);
+      network.data().activation = activation;
+      network.data().has_base = true;
+      network.data().base = SomeMap();
+      const double steepest = SteepestPair(network, 4000);
+      EXPECT_LE(steepest, network.Bound() * testing::RecordBound(
+                                                "steepest of 10 x 4 000 pairs over the bound",
+                                                testing::Computed::kDouble,
+                                                steepest / network.Bound(), 1))
+          << activation << " " << basis;
+    }
 }
 
 // REGRADE_PAIRS=1000000 attacks more networks, each with 20 000 pairs, than the usual one.
@@ -98,13 +100,13 @@ TEST(LipschitzNetwork, H36_StaleNormsAreNotBelieved) {
   network.data().singular_vectors.assign(network.data().singular_vectors.size(), 0.0f);
   float* vectors = network.data().singular_vectors.data();
   for (int l = 0; l < kNetworkLayers; ++l) {
-    const int inputs = LipschitzNetwork::Inputs(l);
+    const int inputs = network.Inputs(l);
     network.weight(l)[0] = 1;
     network.weight(l)[inputs + 1] = 0.5f;
     network.k(l) = 1;
     vectors[1] = 1;
-    vectors[LipschitzNetwork::Outputs(l) + 1] = 1;
-    vectors += LipschitzNetwork::Outputs(l) + inputs;
+    vectors[network.Outputs(l) + 1] = 1;
+    vectors += network.Outputs(l) + inputs;
   }
   EXPECT_NEAR(network.Bound(), 64,
               testing::RecordDigits("bound with stale norms", testing::Computed::kDouble,
@@ -178,12 +180,14 @@ TEST(LocalLipschitz, PairsNearerThanTheirDistanceAreIgnored) {
 TEST(LipschitzNetwork, RefusesWhatIsNoNetwork) {
   LipschitzNetworkData data = RandomNetwork(84).data();
   EXPECT_NO_THROW(LipschitzNetwork{data});
-  for (int defect = 0; defect < 4; ++defect) {
+  for (int defect = 0; defect < 6; ++defect) {
     LipschitzNetworkData bad = data;
     if (defect == 0) bad.parameters.pop_back();
     if (defect == 1) bad.singular_vectors.clear();
     if (defect == 2) bad.parameters[100] = std::numeric_limits<float>::quiet_NaN();
     if (defect == 3) bad.activation = "swish";
+    if (defect == 4) bad.basis = 4;
+    if (defect == 5) bad.basis = 16;  // and the weights are those of nine
     EXPECT_THROW(LipschitzNetwork{bad}, Error) << defect;
   }
 }

@@ -1,6 +1,7 @@
 // LipRF's propositions under their own premises, and how a field that breaks them is reported.
 #include "stylize/field/volume_variance.h"
 #include "tests/support/record_error.h"
+#include "tests/support/row_of_voxels.h"
 #include "tests/support/styled_ball.h"
 
 namespace regrade {

@@ -29,28 +29,33 @@ double PlainGradient(const LipschitzNetwork& network, const RadianceField& field
   for (const Vec3f& target : batch.targets) targets.push_back(target.Cast<double>());
   DenseNetwork<double> d_effective;
   for (int l = 0; l < kNetworkLayers; ++l)
-    d_effective.layers.emplace_back(LipschitzNetwork::Outputs(l), LipschitzNetwork::Inputs(l));
+    d_effective.layers.emplace_back(network.Outputs(l), network.Inputs(l));
   const double loss = Algorithm1<double>(network, field, weights, directions, targets, scale,
                                          view_weight, &d_effective);
   if (gradient != nullptr) network.AddGradient(d_effective, gradient);
   return loss;
 }
 
-std::vector<double> NoGradient() {
-  return std::vector<double>(static_cast<size_t>(LipschitzNetwork::NumParameters()));
+std::vector<double> NoGradient(int basis = 9) {
+  return std::vector<double>(static_cast<size_t>(LipschitzNetwork(basis).NumParameters()));
 }
 
-LipschitzNetwork BasedNetwork(uint64_t stream) {
-  LipschitzNetwork network = RandomNetwork(stream);
+LipschitzNetwork BasedNetwork(uint64_t stream, int basis = 9) {
+  LipschitzNetwork network = RandomNetwork(stream, 1.3, basis);
   network.data().has_base = true;
   network.data().base = SomeMap();
   return network;
 }
 
-TEST(SplatStyle, GradientAgainstRichardson) {
-  const RadianceField field = SplatBall(60, 0.3f);
+// Nine harmonics a channel, or the 16 of degree 3.
+class SplatStyleOf : public ::testing::TestWithParam<int> {};
+INSTANTIATE_TEST_SUITE_P(Harmonics, SplatStyleOf, ::testing::Values(9, 16));
+
+TEST_P(SplatStyleOf, GradientAgainstRichardson) {
+  const int basis = GetParam();
+  const RadianceField field = SplatBall(60, 0.3f, basis);
   const StyleRays batch = SomeRays(2, 6);
-  LipschitzNetwork network = BasedNetwork(90);
+  LipschitzNetwork network = BasedNetwork(90, basis);
   network.data().base.offset = {0.2, 0.2, 0.2};  // no clamp begins or ends within a step
   for (int l = 0; l < kNetworkLayers; ++l) {
     const int64_t first = network.weight(l) - network.weight(0);
@@ -58,7 +63,7 @@ TEST(SplatStyle, GradientAgainstRichardson) {
     for (const int64_t at : {first + 37, bias + 3, &network.k(l) - network.weight(0)}) {
       float& value = network.data().parameters[static_cast<size_t>(at)];
       const float before = value = std::ldexp(std::round(std::ldexp(value, 14)), -14);
-      std::vector<double> analytic = NoGradient();
+      std::vector<double> analytic = NoGradient(basis);
       PlainGradient(network, field, batch, 1.0, 0.7, &analytic);
       const auto central = [&](float h) {
         value = before + h;
@@ -80,11 +85,12 @@ TEST(SplatStyle, GradientAgainstRichardson) {
   }
 }
 
-TEST(SplatStyle, EqualsAlgorithm1) {
-  const RadianceField field = SplatBall(3000);
+TEST_P(SplatStyleOf, EqualsAlgorithm1) {
+  const int basis = GetParam();
+  const RadianceField field = SplatBall(3000, 1, basis);
   const StyleRays batch = SomeRays(1, 30);
-  const LipschitzNetwork network = BasedNetwork(91);
-  std::vector<double> gradient = NoGradient(), expected = NoGradient();
+  const LipschitzNetwork network = BasedNetwork(91, basis);
+  std::vector<double> gradient = NoGradient(basis), expected = NoGradient(basis);
   const AggregationResult result =
       GradientAggregation(field, {.view_weight = 0.7}).Run(network, batch, &gradient);
   EXPECT_GT(result.touched_voxels, 100);
@@ -97,11 +103,12 @@ TEST(SplatStyle, EqualsAlgorithm1) {
                          RelativeDifference(gradient, expected), 1e-5));
 }
 
-TEST(SplatStyle, ThreadsDoNotChangeABit) {
-  const RadianceField field = SplatBall(500);
+TEST_P(SplatStyleOf, ThreadsDoNotChangeABit) {
+  const int basis = GetParam();
+  const RadianceField field = SplatBall(500, 1, basis);
   const StyleRays batch = SomeRays(3, 20);
-  const LipschitzNetwork network = BasedNetwork(94);
-  std::vector<double> gradient[2] = {NoGradient(), NoGradient()};
+  const LipschitzNetwork network = BasedNetwork(94, basis);
+  std::vector<double> gradient[2] = {NoGradient(basis), NoGradient(basis)};
   for (int t = 0; t < 2; ++t) {
     const Threads threads(t == 0 ? 1 : 5);
     GradientAggregation(field, {}).Run(network, batch, &gradient[t]);
@@ -141,8 +148,8 @@ TEST(SplatStyle, LeastSquaresFindALinearStyle) {
   }
 }
 
-TEST(SplatStyle, TrainingBeatsTheLinearMap) {
-  const StyledSplats ball(800, 6, 40, CurvedStyle);
+TEST_P(SplatStyleOf, TrainingBeatsTheLinearMap) {
+  const StyledSplats ball(800, 6, 40, CurvedStyle, GetParam());
   TrainNetworkOptions options;
   options.steps = 120;
   options.rays_per_step = 512;
@@ -246,16 +253,16 @@ double SquaredError(const RadianceField& field, const std::vector<Camera>& camer
 
 // A ball in gentle colours, and pictures of it with one side brighter.
 struct Edited {
-  RadianceField field = SplatBall(600, 0.3f);
+  RadianceField field;
   std::vector<Camera> cameras = Ring(6, 40);
   std::vector<Image> wanted, missing;
 
-  Edited() {
+  explicit Edited(int basis) : field(SplatBall(600, 0.3f, basis)) {
     RadianceField edited = field;
     for (int64_t v = 0; v < field.geometry->num_voxels(); ++v)
       for (int c = 0; c < 3; ++c)
         if (field.geometry->splats.mean[3 * v] > 0)
-          edited.appearance.sh[27 * v + 9 * c] += 0.5f;
+          edited.appearance.sh[basis * (3 * v + c)] += 0.5f;
     const FieldRenderer before(field, Backend::kCpu), after(edited, Backend::kCpu);
     for (const Camera& camera : cameras) {
       wanted.push_back(after.Render(camera).color);
@@ -267,8 +274,8 @@ struct Edited {
   }
 };
 
-TEST(SplatStyle, AResidualShowsAnEdit) {
-  const Edited scene;
+TEST_P(SplatStyleOf, AResidualShowsAnEdit) {
+  const Edited scene(GetParam());
   const VoxelGraph graph = GraphOf(scene.field);
   const int64_t n = scene.field.geometry->num_voxels();
   EXPECT_EQ(graph.voxels, n);
@@ -303,8 +310,8 @@ TEST(SplatStyle, AResidualShowsAnEdit) {
             0.03 * SquaredError(scene.field, scene.cameras, scene.wanted));
 }
 
-TEST(SplatStyle, CoefficientsFitOtherPictures) {
-  const Edited scene;
+TEST_P(SplatStyleOf, CoefficientsFitOtherPictures) {
+  const Edited scene(GetParam());
   RadianceField other = scene.field;
   for (int64_t i = 0; i < other.appearance.sh.size(); ++i)
     other.appearance.sh[i] += static_cast<float>(0.1 * Random(96, static_cast<uint64_t>(i)));
@@ -330,9 +337,9 @@ TEST(SplatStyle, CoefficientsFitOtherPictures) {
 
 // --- pairs
 
-TEST(SplatStyle, PairsStayBelowTheirBound) {
-  const RadianceField source = SplatBall(2500, 0.15f);
-  LipschitzNetwork network = RandomNetwork(301, 0.9);
+TEST_P(SplatStyleOf, PairsStayBelowTheirBound) {
+  const RadianceField source = SplatBall(2500, 0.15f, GetParam());
+  LipschitzNetwork network = RandomNetwork(301, 0.9, GetParam());
   network.data().has_base = true;
   network.data().base = SomeMap();
   network.data().base.offset = {0.1, 0.05, 0.1};

@@ -152,20 +152,24 @@ TEST(SplatWeights, DepthsAreThePictures) {
 }
 
 // EQ(color-bound), of pictures whose colours are not clamped and of others.
-TEST(ColorBound, PicturesDifferByAtMostTheCoefficients) {
+class ColorBound : public ::testing::TestWithParam<int> {};
+INSTANTIATE_TEST_SUITE_P(Degrees, ColorBound, ::testing::Values(2, 3));
+
+TEST_P(ColorBound, PicturesDifferByAtMostTheCoefficients) {
+  const int basis = BasisOfDegree(GetParam()), terms = 3 * basis;
   for (const float contrast : {0.3f, 2.0f}) {
-    RadianceField one = SplatBall(700, contrast), other = one;
+    RadianceField one = SplatBall(700, contrast, basis), other = one;
     double most = 0;
     for (int64_t i = 0; i < one.geometry->num_voxels(); ++i) {
       double sum = 0;
-      for (int k = 0; k < 27; ++k) {
-        const double change = 0.1 * Random(81, static_cast<uint64_t>(27 * i + k));
-        other.appearance.sh[27 * i + k] += static_cast<float>(change);
+      for (int k = 0; k < terms; ++k) {
+        const double change = 0.1 * Random(81, static_cast<uint64_t>(terms * i + k));
+        other.appearance.sh[terms * i + k] += static_cast<float>(change);
         sum += change * change;
       }
       most = std::max(most, std::sqrt(sum));
     }
-    const double gamma = 3 / (2 * std::sqrt(M_PI));  // 0.846
+    const double gamma = (GetParam() + 1) / (2 * std::sqrt(M_PI));  // 0.846, 1.128
     double largest = 0;
     for (const Camera& camera : Ring(4, 40)) {
       const auto a = RenderSplatsPlain(SplatsOf(one), camera, SplatOptionsOf(one));

@@ -28,23 +28,26 @@ T Algorithm1(const LipschitzNetwork& network, const RadianceField& field,
   const std::vector<int32_t> place = PlaceOfColumn(geometry.spheres);
   const int64_t voxels = geometry.num_voxels(), n = voxels + geometry.spheres.num_texels();
 
+  const NetworkRow row_of = network.row();
+  const int harmonics = row_of.basis, terms = row_of.sh();
+
   // 0. feed forward
-  std::vector<T> features(static_cast<size_t>(n) * kNetworkInputs);
-  std::vector<T> sh(static_cast<size_t>(n) * kNetworkSh), change(sh.size()), d_sh(sh.size());
+  std::vector<T> features(static_cast<size_t>(n) * row_of.inputs());
+  std::vector<T> sh(static_cast<size_t>(n) * terms), change(sh.size()), d_sh(sh.size());
   std::vector<T> mass(static_cast<size_t>(n) * 3);  // see EQ(view-penalty)
   for (int64_t v = 0; v < n; ++v) {
-    float row[kFeatureStride];
+    float row[kLargestRow.stride()];
     if (v < voxels)
       FillFeatures(field, network.data().position_scale, v, vertex[v], row);
     else
       FillTexelFeatures(field, network.data().position_scale, v - voxels,
                         place[(v - voxels) / geometry.spheres.layers], row);
-    T* x = &features[static_cast<size_t>(v) * kNetworkInputs];
-    std::copy_n(row, kNetworkInputs, x);
-    T* y = &sh[static_cast<size_t>(v) * kNetworkSh];
+    T* x = &features[static_cast<size_t>(v) * row_of.inputs()];
+    std::copy_n(row, row_of.inputs(), x);
+    T* y = &sh[static_cast<size_t>(v) * terms];
     DenseForward(f, x, y);
-    std::copy_n(y, kNetworkSh, &change[static_cast<size_t>(v) * kNetworkSh]);
-    if (network.data().has_base) AddBaseMap(network.data().base, x, y);
+    std::copy_n(y, terms, &change[static_cast<size_t>(v) * terms]);
+    if (network.data().has_base) AddBaseMap(network.data().base, network.row().basis, x, y);
   }
 
   // 1. from the loss to the image, and 2. from the image to the coefficients
@@ -61,16 +64,15 @@ T Algorithm1(const LipschitzNetwork& network, const RadianceField& field,
       int32_t points[8];
       CornerPoints(geometry, sample, points);
       const T* const gamma = basis.Of(i);
-      T blend[kNetworkSh] = {};
+      T blend[kLargestRow.sh()] = {};
       for (int corner = 0; corner < 8; ++corner)
-        for (int k = 0; k < kNetworkSh && points[corner] >= 0; ++k)
-          blend[k] +=
-              CornerWeight(fraction, corner) *
-              sh[static_cast<size_t>(points[corner]) * kNetworkSh + static_cast<size_t>(k)];
+        for (int k = 0; k < terms && points[corner] >= 0; ++k)
+          blend[k] += CornerWeight(fraction, corner) *
+                      sh[static_cast<size_t>(points[corner]) * terms + static_cast<size_t>(k)];
       for (int c = 0; c < 3; ++c) {
         T value = T(0.5);
-        for (int k = 0; k < (sample.on_sphere() ? 1 : 9); ++k)
-          value += blend[c * 9 + k] * gamma[k];
+        for (int k = 0; k < (sample.on_sphere() ? 1 : harmonics); ++k)
+          value += blend[c * harmonics + k] * gamma[k];
         raw[i - first][c] = value;
         color[c] += T(sample.weight) * std::max(value, T(0));
       }
@@ -89,12 +91,13 @@ T Algorithm1(const LipschitzNetwork& network, const RadianceField& field,
           if (points[corner] >= 0 && !sample.on_sphere())
             mass[static_cast<size_t>(points[corner]) * 3 + static_cast<size_t>(c)] +=
                 T(sample.weight) * CornerWeight(fraction, corner);
-        for (int k = 0; k < (sample.on_sphere() ? 1 : 9); ++k) {
+        for (int k = 0; k < (sample.on_sphere() ? 1 : harmonics); ++k) {
           const T d_blend = 2 * scale * difference[c] * T(sample.weight) * gamma[k];
           for (int corner = 0; corner < 8; ++corner)
             if (points[corner] >= 0)
-              d_sh[static_cast<size_t>(points[corner]) * kNetworkSh +
-                   static_cast<size_t>(c * 9 + k)] += CornerWeight(fraction, corner) * d_blend;
+              d_sh[static_cast<size_t>(points[corner]) * terms +
+                   static_cast<size_t>(c * harmonics + k)] +=
+                  CornerWeight(fraction, corner) * d_blend;
         }
       }
     }
@@ -102,17 +105,17 @@ T Algorithm1(const LipschitzNetwork& network, const RadianceField& field,
 
   // and what changes with the direction
   for (size_t i = 0; i < sh.size(); ++i) {
-    if (i % 9 == 0) continue;
-    const ViewPenalty<T> penalty = ViewPenaltyOf(mass[i / 9], change[i]);
+    const size_t channel = i / static_cast<size_t>(harmonics);
+    if (i % static_cast<size_t>(harmonics) == 0) continue;
+    const ViewPenalty<T> penalty = ViewPenaltyOf(mass[channel], change[i]);
     loss += scale * view_weight * penalty.value;
     d_sh[i] += scale * view_weight * penalty.derivative;
   }
 
   // 3. from the coefficients to f
   for (int64_t v = 0; v < n; ++v)
-    DenseAdjoint(f, &features[static_cast<size_t>(v) * kNetworkInputs],
-                 &d_sh[static_cast<size_t>(v) * kNetworkSh], d_effective,
-                 static_cast<T*>(nullptr));
+    DenseAdjoint(f, &features[static_cast<size_t>(v) * row_of.inputs()],
+                 &d_sh[static_cast<size_t>(v) * terms], d_effective, static_cast<T*>(nullptr));
   return loss;
 }
 

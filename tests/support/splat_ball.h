@@ -29,11 +29,13 @@ inline RadianceField SplatBall(int64_t count, float contrast = 1, int basis = 9)
     for (int c = 0; c < 3; ++c)
       for (int k = 0; k < basis; ++k)
         splats.sh[static_cast<size_t>(3 * basis * i + basis * c + k)] =
-            contrast * (k == 0
-                            ? 1.5f * std::sin(3 * p.x + 2 * static_cast<float>(c)) *
-                                  std::cos(4 * p.y - p.z + static_cast<float>(c))
-                            : 0.1f * static_cast<float>(Draw(
-                                         75, item, static_cast<uint64_t>(9 * c + k), -1, 1)));
+            contrast *
+            (k == 0
+                 ? 1.5f * std::sin(3 * p.x + 2 * static_cast<float>(c)) *
+                       std::cos(4 * p.y - p.z + static_cast<float>(c))
+                 : 0.1f * static_cast<float>(Draw(
+                              75, item, static_cast<uint64_t>((basis > 9 ? basis : 9) * c + k),
+                              -1, 1)));
   }
   splats.background = {0.2f, 0.3f, 0.1f};
   return FieldOfSplats(splats, GridFrame{}, 0.2f, false);
@@ -46,8 +48,8 @@ struct StyledSplats {
   std::vector<StyledTrainingView> views;
 
   template <typename Style>
-  StyledSplats(int64_t splats, int num_views, int size, const Style& style)
-      : field(SplatBall(splats, 0.4f)) {
+  StyledSplats(int64_t splats, int num_views, int size, const Style& style, int basis = 9)
+      : field(SplatBall(splats, 0.4f, basis)) {
     const std::vector<Camera> cameras = Ring(num_views, size);
     const FieldRenderer renderer(field, Backend::kCpu);
     masks.assign(cameras.size(), Image(size, size, 1));

@@ -150,8 +150,8 @@ inline Vec3f CurvedStyle(const Vec3f& c) {
   return {0.2f + 0.3f * c.x + 0.4f * s, 0.3f * c.y + 0.5f * s, 0.5f + 0.3f * c.z - 0.4f * s};
 }
 
-inline LipschitzNetwork RandomNetwork(uint64_t stream, double k = 1.3) {
-  LipschitzNetwork network;
+inline LipschitzNetwork RandomNetwork(uint64_t stream, double k = 1.3, int basis = 9) {
+  LipschitzNetwork network(basis);
   for (size_t i = 0; i < network.data().parameters.size(); ++i)
     network.data().parameters[i] = static_cast<float>(0.3 * Random(stream, i));
   for (int l = 0; l < kNetworkLayers; ++l) network.k(l) = static_cast<float>(k);

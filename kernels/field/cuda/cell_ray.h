@@ -35,7 +35,7 @@ struct alignas(16) FourVertices {
 // The colour before the clamp from the records of kCorners vertices; see EQ(sh-basis).
 template <int kBasis, int kCorners>
 HD Vec3f ColorOfRecords(const DeviceGridView& grid, const int32_t (&corner)[kCorners],
-                        const float (&weight)[kCorners], const float (&basis)[kMaxBasis]) {
+                        const float (&weight)[kCorners], const float (&basis)[kMaxVoxelBasis]) {
   constexpr int kUsed = 3 * kBasis;  // of a record's values; the density follows
   Vec3f raw{0.5f, 0.5f, 0.5f};
   for (int quad = 0; 4 * quad < kUsed; ++quad) {
@@ -56,7 +56,7 @@ HD Vec3f ColorOfRecords(const DeviceGridView& grid, const int32_t (&corner)[kCor
 // A vertex's colour before the clamp as the camera sees it, and its density.
 template <int kBasis>
 HD FourFloats ColorOfVertex(const DeviceGridView& grid, const PinholeRays& camera, int32_t v) {
-  float basis[kMaxBasis];
+  float basis[kMaxVoxelBasis];
   ShBasis(kBasis, DirectionToVertex(grid.frame, grid.vertex_key[v], camera), basis);
   const int32_t corner[1] = {v};
   const float weight[1] = {1};
@@ -76,7 +76,7 @@ struct CellRaySums {
 template <int kBasis, bool kColors>
 HD CellRaySums RenderCellRay(const DeviceGridView& grid, const Ray& ray,
                              const FourFloats* colors, float wide_until, float stop) {
-  float basis[kMaxBasis];
+  float basis[kMaxVoxelBasis];
   ShBasis(kBasis, ray.direction, basis);
   CellRaySums sums;
   float optical_depth = 0;

@@ -180,7 +180,7 @@ __global__ void FitCellRaysKernel(DeviceGridView grid, const Ray* rays, const Ve
   const SampleStore store{reinterpret_cast<float4*>(lists.place) + begin,
                           reinterpret_cast<float4*>(lists.raw_tau) + begin, nullptr,
                           reinterpret_cast<float4*>(lists.rest) + begin};
-  float basis[kMaxBasis];
+  float basis[kMaxVoxelBasis];
   ShBasis(kBasis, rays[r].direction, basis);
   const LaneValues<kBasis> values(lane, basis);
   const int count = lists.count[r];
@@ -218,7 +218,7 @@ __global__ void FitRaysKernel(DeviceGridView grid, const Ray* rays, const Vec3f*
     r = __shfl_sync(kAllLanes, r, 0);
     if (r >= n) break;
     const Ray ray = rays[r];
-    float basis[kMaxBasis];
+    float basis[kMaxVoxelBasis];
     ShBasis(kBasis, ray.direction, basis);
     const LaneValues<kBasis> values(lane, basis);
     WarpMarch<> march(grid, ray, options);

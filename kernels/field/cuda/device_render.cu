@@ -88,7 +88,7 @@ class OpacitySteps {
 // A ray prepared by one thread of the block for a warp.
 struct PreparedRay {
   GridRay<float> ray;
-  float basis[kMaxBasis];
+  float basis[kMaxVoxelBasis];
 };
 
 // A warp's results for a ray.

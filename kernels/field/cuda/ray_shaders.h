@@ -16,7 +16,8 @@ class FloatShader {
   using Sampler = GridSampler;
   static constexpr int kGroup = RecordLayout<kBasis>::kGroup;
 
-  __device__ FloatShader(const DeviceGridView& grid, const float (&basis)[kMaxBasis], int lane)
+  __device__ FloatShader(const DeviceGridView& grid, const float (&basis)[kMaxVoxelBasis],
+                         int lane)
       : grid_(grid), values_(lane, basis), lane_(lane) {}
   __device__ Sampler sampler() const { return Sampler(grid_); }
   __device__ void Add(int vertex, const Vec3f& fraction, bool valid, float weight) {
@@ -42,7 +43,8 @@ class HalfShader {
   using Sampler = HalfGridSampler;
   static constexpr int kGroup = 4;
 
-  __device__ HalfShader(const HalfGridView& grid, const float (&basis)[kMaxBasis], int lane)
+  __device__ HalfShader(const HalfGridView& grid, const float (&basis)[kMaxVoxelBasis],
+                        int lane)
       : grid_(grid), records_(grid.records + lane % kGroup * 8), lane_(lane) {
 #pragma unroll
     for (int i = 0; i < 8; ++i) gamma_[i] = basis[lane % kGroup == 3 ? 8 : i];

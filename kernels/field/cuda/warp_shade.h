@@ -26,7 +26,7 @@ struct LaneValues {
   float of[3][Layout::kValues] = {};
   float density[Layout::kValues] = {};
 
-  __device__ LaneValues(int lane, const float (&basis)[kMaxBasis]) {
+  __device__ LaneValues(int lane, const float (&basis)[kMaxVoxelBasis]) {
 #pragma unroll
     for (int index = 0; index <= DensityLane(kBasis); ++index) {
       if (index / Layout::kValues != lane % Layout::kGroup) continue;

@@ -27,12 +27,12 @@ struct Scratch {
   __device__ float* Slope(int l) const { return slopes + (l - 1) * rows * kMlpHidden; }
 };
 
-template <bool kSplit, bool kKeep>
-__device__ void WalkDown(const MlpView& mlp, const Weights& weights, const float* input,
-                         int64_t row, int64_t n, const Scratch& scratch,
+template <bool kSplit, bool kKeep, int kEnds>
+__device__ void WalkDown(const MlpView<kEnds>& mlp, const Weights<kEnds>& weights,
+                         const float* input, int64_t row, int64_t n, const Scratch& scratch,
                          Tile (&hidden)[kHiddenTiles]) {
-  Tile first[kEndTiles], slope[kHiddenTiles];
-  LoadRows(input, kMlpEndLanes, row, n, first);
+  Tile first[kEnds / 8], slope[kHiddenTiles];
+  LoadRows(input, kEnds, row, n, first);
   Dense<kSplit>(weights, 0, first, hidden);
   for (int l = 1;; ++l) {
     ActivateRows<kKeep>(mlp, hidden, slope);
@@ -64,37 +64,38 @@ __device__ inline int64_t WarpOfGrid() {
   return (blockIdx.x * static_cast<int64_t>(blockDim.x) + threadIdx.x) / 32;
 }
 
-template <bool kSplit>
+template <bool kSplit, int kEnds>
 __global__ void __launch_bounds__(kThreads)
-    ForwardKernel(MlpView mlp, bool stage, const float* input, RowCount count, float* output) {
+    ForwardKernel(MlpView<kEnds> mlp, bool stage, const float* input, RowCount count,
+                  float* output) {
   const int64_t n = count.Get();
   if (n <= 0) return;
   extern __shared__ float4 shared_quads[];
-  const Weights weights(mlp, stage ? reinterpret_cast<float*>(shared_quads) : nullptr);
+  const Weights<kEnds> weights(mlp, stage ? reinterpret_cast<float*>(shared_quads) : nullptr);
   const int64_t warps = static_cast<int64_t>(gridDim.x) * (blockDim.x / 32);
   for (int64_t row = WarpOfGrid() * kRows; row < n; row += warps * kRows) {
-    Tile hidden[kHiddenTiles], last[kEndTiles];
+    Tile hidden[kHiddenTiles], last[kEnds / 8];
     WalkDown<kSplit, false>(mlp, weights, input, row, n, {}, hidden);
     Dense<kSplit>(weights, mlp.layers - 1, hidden, last);
-    StoreRows(output, kMlpEndLanes, row, n, last);
+    StoreRows(output, kEnds, row, n, last);
   }
 }
 
-template <bool kSplit>
+template <bool kSplit, int kEnds>
 __global__ void __launch_bounds__(kThreads)
-    AdjointRowsKernel(MlpView mlp, bool stage, const float* input, const float* d_output,
+    AdjointRowsKernel(MlpView<kEnds> mlp, bool stage, const float* input, const float* d_output,
                       RowCount count, Scratch scratch) {
   const int64_t n = count.Get();
   if (n <= 0) return;
   extern __shared__ float4 shared_quads[];
-  const Weights weights(mlp, stage ? reinterpret_cast<float*>(shared_quads) : nullptr);
+  const Weights<kEnds> weights(mlp, stage ? reinterpret_cast<float*>(shared_quads) : nullptr);
   const int64_t warps = static_cast<int64_t>(gridDim.x) * (blockDim.x / 32);
   for (int64_t row = WarpOfGrid() * kRows; row < n; row += warps * kRows) {
     Tile d_hidden[kHiddenTiles], slope[kHiddenTiles];
     WalkDown<kSplit, true>(mlp, weights, input, row, n, scratch,
                            d_hidden);  // its contents are already stored
-    Tile d_last[kEndTiles];
-    LoadRows(d_output, kMlpEndLanes, row, n, d_last);
+    Tile d_last[kEnds / 8];
+    LoadRows(d_output, kEnds, row, n, d_last);
     DenseAdjointRows<kSplit>(weights, mlp.layers - 1, d_last, d_hidden);
     for (int l = mlp.layers - 1;; --l) {
       LoadRows(scratch.Slope(l), kMlpHidden, row, n, slope);
@@ -124,10 +125,10 @@ __device__ inline void StageRows(const float* from, int width, int64_t row, int6
   }
 }
 
-template <bool kSplit>
+template <bool kSplit, int kEnds>
 __global__ void __launch_bounds__(kOuterThreads)
-    OuterProductsKernel(MlpView mlp, const float* input, const float* d_output, RowCount count,
-                        Scratch scratch, float* parts, int64_t parameters) {
+    OuterProductsKernel(MlpView<kEnds> mlp, const float* input, const float* d_output,
+                        RowCount count, Scratch scratch, float* parts, int64_t parameters) {
   const int64_t n = count.Get();
   if (blockIdx.x * static_cast<int64_t>(kOuterRows) >= n) return;
   __shared__ float4 left_quads[kOuterRows * kOuterStride / 4],
@@ -197,9 +198,18 @@ __global__ void AddPartsKernel(const float* parts, int64_t parameters, RowCount 
   gradient[i] += sum;
 }
 
-MlpView ViewOf(const FusedMlp& shape, const DeviceBuffer<float>& parameters) {
-  return {parameters.data(), static_cast<int>(shape.layers.size()), shape.activation,
-          shape.omega};
+// Calls body(MlpView) of the network's width.
+template <typename Body>
+void ByEnds(const FusedMlp& shape, const DeviceBuffer<float>& parameters, const Body& body) {
+  const auto call = [&](auto view) {
+    view = {parameters.data(), static_cast<int>(shape.layers.size()), shape.activation,
+            shape.omega};
+    body(view);
+  };
+  if (shape.ends == 32)
+    call(MlpView<32>());
+  else
+    call(MlpView<64>());
 }
 
 // Launch configuration of kernels over rows: weights are in shared memory if they fit.
@@ -207,12 +217,12 @@ struct WalkLaunch {
   bool stage;
   unsigned blocks, bytes;
 
-  template <typename Kernel>
-  WalkLaunch(const Kernel& kernel, const MlpView& mlp, int64_t n) {
+  template <typename Kernel, int kEnds>
+  WalkLaunch(const Kernel& kernel, const MlpView<kEnds>& mlp, int64_t n) {
     int most = 0, processors = 1;
     cudaDeviceGetAttribute(&most, cudaDevAttrMaxSharedMemoryPerBlockOptin, 0);
     cudaDeviceGetAttribute(&processors, cudaDevAttrMultiProcessorCount, 0);
-    const int wanted = Weights::SharedFloats(mlp) * static_cast<int>(sizeof(float));
+    const int wanted = Weights<kEnds>::SharedFloats(mlp) * static_cast<int>(sizeof(float));
     stage = wanted <= most;
     bytes = stage ? static_cast<unsigned>(wanted) : 0;
     if (stage)
@@ -223,25 +233,25 @@ struct WalkLaunch {
   }
 };
 
-template <bool kSplit>
-void LaunchForward(const MlpView& mlp, const float* input, const RowCount& count,
+template <bool kSplit, int kEnds>
+void LaunchForward(const MlpView<kEnds>& mlp, const float* input, const RowCount& count,
                    float* output) {
-  const WalkLaunch launch(ForwardKernel<kSplit>, mlp, count.n);
-  ForwardKernel<kSplit><<<launch.blocks, kThreads, launch.bytes, LaunchStream()>>>(
+  const WalkLaunch launch(ForwardKernel<kSplit, kEnds>, mlp, count.n);
+  ForwardKernel<kSplit, kEnds><<<launch.blocks, kThreads, launch.bytes, LaunchStream()>>>(
       mlp, launch.stage, input, count, output);
   CheckLaunch("mlp_forward");
 }
 
-template <bool kSplit>
-void LaunchAdjoint(const MlpView& mlp, const float* input, const float* d_output,
+template <bool kSplit, int kEnds>
+void LaunchAdjoint(const MlpView<kEnds>& mlp, const float* input, const float* d_output,
                    const RowCount& count, const Scratch& scratch,
                    const DeviceBuffer<float>& parts, const DeviceBuffer<double>& gradient) {
-  const WalkLaunch launch(AdjointRowsKernel<kSplit>, mlp, count.n);
-  AdjointRowsKernel<kSplit><<<launch.blocks, kThreads, launch.bytes, LaunchStream()>>>(
+  const WalkLaunch launch(AdjointRowsKernel<kSplit, kEnds>, mlp, count.n);
+  AdjointRowsKernel<kSplit, kEnds><<<launch.blocks, kThreads, launch.bytes, LaunchStream()>>>(
       mlp, launch.stage, input, d_output, count, scratch);
   CheckLaunch("mlp_adjoint_rows");
   const dim3 blocks(kOuterParts, static_cast<unsigned>(mlp.layers));
-  OuterProductsKernel<kSplit><<<blocks, kOuterThreads, 0, LaunchStream()>>>(
+  OuterProductsKernel<kSplit, kEnds><<<blocks, kOuterThreads, 0, LaunchStream()>>>(
       mlp, input, d_output, count, scratch, parts.data(), gradient.size());
   CheckLaunch("mlp_outer_products");
   AddPartsKernel<<<BlocksFor(gradient.size()), kThreads, 0, LaunchStream()>>>(
@@ -254,11 +264,12 @@ void LaunchAdjoint(const MlpView& mlp, const float* input, const float* d_output
 void DeviceMlp::Forward(MlpPrecision precision, const float* input, int64_t n, float* output,
                         const int32_t* counted) const {
   if (n == 0) return;
-  const MlpView mlp = ViewOf(shape_, parameters_);
-  if (precision == MlpPrecision::kSplit)
-    LaunchForward<true>(mlp, input, {n, counted, 0}, output);
-  else
-    LaunchForward<false>(mlp, input, {n, counted, 0}, output);
+  ByEnds(shape_, parameters_, [&](const auto& mlp) {
+    if (precision == MlpPrecision::kSplit)
+      LaunchForward<true>(mlp, input, {n, counted, 0}, output);
+    else
+      LaunchForward<false>(mlp, input, {n, counted, 0}, output);
+  });
 }
 
 void DeviceMlp::ReserveAdjoint(int64_t n) {
@@ -273,17 +284,19 @@ void DeviceMlp::ReserveAdjoint(int64_t n) {
 
 void DeviceMlp::AddAdjoint(MlpPrecision precision, const float* input, const float* d_output,
                            int64_t n, const int32_t* counted) {
-  const MlpView mlp = ViewOf(shape_, parameters_);
-  const int64_t rows = std::min(n, kChunk), kept = (mlp.layers - 1) * rows * kMlpHidden;
+  const int64_t rows = std::min(n, kChunk),
+                kept = (std::ssize(shape_.layers) - 1) * rows * kMlpHidden;
   ReserveAdjoint(n);
   for (int64_t begin = 0; begin < n; begin += rows) {
     const RowCount count{std::min(rows, n - begin), counted, begin};
     const Scratch scratch{scratch_.data(), scratch_.data() + kept, rows};
-    const float *from = input + begin * kMlpEndLanes, *d_from = d_output + begin * kMlpEndLanes;
-    if (precision == MlpPrecision::kSplit)
-      LaunchAdjoint<true>(mlp, from, d_from, count, scratch, parts_, gradient_);
-    else
-      LaunchAdjoint<false>(mlp, from, d_from, count, scratch, parts_, gradient_);
+    const float *from = input + begin * shape_.ends, *d_from = d_output + begin * shape_.ends;
+    ByEnds(shape_, parameters_, [&](const auto& mlp) {
+      if (precision == MlpPrecision::kSplit)
+        LaunchAdjoint<true>(mlp, from, d_from, count, scratch, parts_, gradient_);
+      else
+        LaunchAdjoint<false>(mlp, from, d_from, count, scratch, parts_, gradient_);
+    });
   }
 }
 

@@ -22,12 +22,12 @@ class DeviceMlp {
   // Sets other weights of the same shapes.
   void Set(const FusedMlp& mlp);
 
-  // output [n, kMlpEndLanes] of input [n, kMlpEndLanes]; both on the device. `counted`, if not
+  // output [n, ends] of input [n, ends], see FusedMlp; both on the device. `counted`, if not
   // null, is on the device, too: then n is the capacity and *counted the number of rows.
   void Forward(MlpPrecision precision, const float* input, int64_t n, float* output,
                const int32_t* counted = nullptr) const;
 
-  // Adds the adjoint for d_output [n, kMlpEndLanes] to sums that TakeGradient returns and
+  // Adds the adjoint for d_output [n, ends] to sums that TakeGradient returns and
   // resets to zero. The forward pass is recomputed chunk by chunk, so memory does not grow with
   // n. Sums have a fixed order, which depends on the number of rows meant and not on n.
   void AddAdjoint(MlpPrecision precision, const float* input, const float* d_output, int64_t n,

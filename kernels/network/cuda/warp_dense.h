@@ -8,21 +8,20 @@
 
 namespace regrade {
 
-inline constexpr int kRows = 16;                    // a warp's tile
-inline constexpr int kEndTiles = kMlpEndLanes / 8;  // columns of a tile are 8
-inline constexpr int kHiddenTiles = kMlpHidden / 8;
+inline constexpr int kRows = 16;                     // a warp's tile
+inline constexpr int kHiddenTiles = kMlpHidden / 8;  // columns of a tile are 8
 inline constexpr int kPad = 8;  // floats after a row of weights: avoids bank conflicts
 
+// Of a network whose ends are kEnds wide.
+template <int kEnds>
 struct MlpView {
   const float* parameters;  // in the layout of FusedMlp::Offset
   int layers;
   Activation activation;
   float omega;
 
-  __host__ __device__ int Inputs(int l) const { return l == 0 ? kMlpEndLanes : kMlpHidden; }
-  __host__ __device__ int Outputs(int l) const {
-    return l + 1 == layers ? kMlpEndLanes : kMlpHidden;
-  }
+  __host__ __device__ int Inputs(int l) const { return l == 0 ? kEnds : kMlpHidden; }
+  __host__ __device__ int Outputs(int l) const { return l + 1 == layers ? kEnds : kMlpHidden; }
   __host__ __device__ int Offset(int l) const {
     int offset = 0;
     for (int i = 0; i < l; ++i) offset += Outputs(i) * (Inputs(i) + 1);
@@ -31,9 +30,10 @@ struct MlpView {
 };
 
 // Weights in shared memory, or in global memory if they do not fit.
+template <int kEnds>
 class Weights {
  public:
-  __device__ Weights(const MlpView& mlp, float* shared) : mlp_(mlp), shared_(shared) {
+  __device__ Weights(const MlpView<kEnds>& mlp, float* shared) : mlp_(mlp), shared_(shared) {
     if (shared == nullptr) return;
     for (int l = 0; l < mlp.layers; ++l) {
       const int inputs = mlp.Inputs(l), outputs = mlp.Outputs(l), stride = inputs + kPad;
@@ -55,7 +55,7 @@ class Weights {
     return shared_ != nullptr ? shared_ + SharedOffset(l) : mlp_.parameters + mlp_.Offset(l);
   }
   __device__ const float* Bias(int l) const { return Matrix(l) + mlp_.Outputs(l) * Stride(l); }
-  __host__ __device__ static int SharedFloats(const MlpView& mlp) {
+  __host__ __device__ static int SharedFloats(const MlpView<kEnds>& mlp) {
     int floats = 0;
     for (int l = 0; l < mlp.layers; ++l) floats += mlp.Outputs(l) * (mlp.Inputs(l) + kPad + 1);
     return floats;
@@ -67,7 +67,7 @@ class Weights {
     for (int i = 0; i < l; ++i) offset += mlp_.Outputs(i) * (mlp_.Inputs(i) + kPad + 1);
     return offset;
   }
-  const MlpView& mlp_;
+  const MlpView<kEnds>& mlp_;
   float* shared_;
 };
 
@@ -112,8 +112,8 @@ __device__ void StoreRows(float* to, int width, int64_t row, int64_t n,
 }
 
 // out = A in + b
-template <bool kSplit, int kIn, int kOut>
-__device__ void Dense(const Weights& weights, int layer, const Tile (&in)[kIn],
+template <bool kSplit, int kEnds, int kIn, int kOut>
+__device__ void Dense(const Weights<kEnds>& weights, int layer, const Tile (&in)[kIn],
                       Tile (&out)[kOut]) {
   const LanePlace lane;
   const float *matrix = weights.Matrix(layer), *bias = weights.Bias(layer);
@@ -134,9 +134,9 @@ __device__ void Dense(const Weights& weights, int layer, const Tile (&in)[kIn],
 }
 
 // d_in = A^T d_out
-template <bool kSplit, int kIn, int kOut>
-__device__ void DenseAdjointRows(const Weights& weights, int layer, const Tile (&d_out)[kOut],
-                                 Tile (&d_in)[kIn]) {
+template <bool kSplit, int kEnds, int kIn, int kOut>
+__device__ void DenseAdjointRows(const Weights<kEnds>& weights, int layer,
+                                 const Tile (&d_out)[kOut], Tile (&d_in)[kIn]) {
   const LanePlace lane;
   const float* matrix = weights.Matrix(layer);
   const int stride = weights.Stride(layer);
@@ -153,8 +153,8 @@ __device__ void DenseAdjointRows(const Weights& weights, int layer, const Tile (
 }
 
 // x becomes act(x); slope becomes act'(x) if kWantSlope.
-template <bool kWantSlope>
-__device__ void ActivateRows(const MlpView& mlp, Tile (&x)[kHiddenTiles],
+template <bool kWantSlope, int kEnds>
+__device__ void ActivateRows(const MlpView<kEnds>& mlp, Tile (&x)[kHiddenTiles],
                              Tile (&slope)[kHiddenTiles]) {
   if (mlp.activation == Activation::kSine) {
 #pragma unroll

@@ -33,7 +33,7 @@ void ForEachGradient(const SplatFrame& frame, const SplatTileSums& sums, const U
   for (int64_t i = 0; i < frame.splats.count; ++i) {
     const size_t at = static_cast<size_t>(i);
     Splat<float> d{};
-    float d_sh[3 * kMaxSplatBasis] = {};
+    float d_sh[3 * kMaxBasis] = {};
     if (!frame.box[at].empty()) {
       SplatSums<double> total;
       for (int64_t s = frame.first_slot[at]; s < frame.first_slot[at + 1]; ++s)

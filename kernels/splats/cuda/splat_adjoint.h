@@ -89,7 +89,7 @@ __global__ void __launch_bounds__(kBlock) UseColors(SplatSumsView view, Use use)
     if (thread < count) {
       const ColorSums own = view.color[List::First() + list[begin + thread]];
       float harmonics[kBasis];
-      ShBasisTo3(kBasis, own.direction, harmonics);
+      ShBasis(kBasis, own.direction, harmonics);
       for (int k = 0; k < kBasis; ++k) gamma[thread][k] = harmonics[k];
       for (int c = 0; c < 3; ++c) d_color[thread][c] = own.d_color[c];
     }
