@@ -190,7 +190,7 @@ TEST(TrainNetwork, HiddenBiasesStayZeroWhereThereAreNone) {
       TrainNetwork(ball.field, ball.views, MapOf(ball), {}, options, {});
   for (int l = 0; l < kNetworkLayers; ++l) {
     float largest = 0;
-    for (int o = 0; o < network.Outputs(l); ++o)
+    for (int o = 0; o < result.network.Outputs(l); ++o)
       largest = std::max(largest, std::abs(result.network.bias(l)[o]));
     EXPECT_EQ(largest > 0, l + 1 == kNetworkLayers) << l;
   }

@@ -69,6 +69,26 @@ struct StyledSplats {
   }
 };
 
+// The least squares of its targets.
+inline SceneColorMap MapOf(const StyledSplats& ball) {
+  StyleRays all;
+  for (size_t v = 0; v < ball.views.size(); ++v) {
+    all.cameras.push_back(ball.views[v].camera);
+    const Image& target = ball.targets[v];
+    for (int y = 0; y < target.height; ++y)
+      for (int x = 0; x < target.width; ++x) {
+        const float* t = target.at(x, y);
+        all.AddPixel(static_cast<int32_t>(v), x, y);
+        all.targets.push_back({t[0], t[1], t[2]});
+        if (*ball.masks[v].at(x, y) < 0.5f) all.targets.back().x = std::nanf("");
+      }
+  }
+  SceneColorMap result;
+  result.map = LeastSquaresMap(ball.field, all, {.max_transmittance = 0.5f});
+  result.k_est = SpectralNorm(result.map.matrix);
+  return result;
+}
+
 // Every pixel of some cameras.
 inline ViewRays PixelsOf(const std::vector<Camera>& cameras) {
   ViewRays rays{.cameras = cameras};
