@@ -20,7 +20,7 @@
 namespace regrade {
 namespace {
 
-constexpr double kStep = 0.03;  // regrade page's
+constexpr double kSplatPageStep = 0.03;  // regrade page's
 
 RadianceField FieldOf(int64_t count, int basis, bool antialiased = false) {
   const GridFrame box{{}, {0.1f, 0, -0.2f}, {0.8f, 1, 0.7f}};
@@ -38,7 +38,7 @@ TEST(SplatCodec, DecodedSplatsRenderAsTheExactOnes) {
   for (const int basis : {1, 4, 9})
     for (const bool antialiased : {false, true}) {
       const RadianceField field = FieldOf(800, basis, antialiased);
-      const RadianceField decoded = DecodeField(EncodeField(field, kStep));
+      const RadianceField decoded = DecodeField(EncodeField(field, kSplatPageStep));
       EXPECT_EQ(decoded.geometry->splats.antialiased, antialiased);
       EXPECT_GE(testing::Psnr(Picture(field), Picture(decoded)), 48) << basis;
     }
@@ -46,7 +46,7 @@ TEST(SplatCodec, DecodedSplatsRenderAsTheExactOnes) {
 
 // A page has harmonics of degree 2 at most.
 TEST(SplatCodec, HigherHarmonicsAreLeftOut) {
-  const RadianceField decoded = DecodeField(EncodeField(FieldOf(50, 16), kStep));
+  const RadianceField decoded = DecodeField(EncodeField(FieldOf(50, 16), kSplatPageStep));
   EXPECT_EQ(decoded.appearance.basis, 9);
 }
 
@@ -112,7 +112,7 @@ TEST(SplatCodec, FirstComeThoseThatContributeMost) {
 // What a style adds splat by splat needs the same order from both fields.
 TEST(SplatCodec, OrderIsThatOfTheDecodedField) {
   const RadianceField field = FieldOf(500, 4);
-  const PageField page = EncodeField(field, kStep);
+  const PageField page = EncodeField(field, kSplatPageStep);
   const RadianceField decoded = DecodeField(page);
   const PageVoxels of = RecordsInPageOrder(page, *field.geometry),
                    own = RecordsInPageOrder(page, *decoded.geometry);
