@@ -18,12 +18,9 @@ namespace {
 
 using testing::ProgramOutcome;
 using testing::ReadText;
+using testing::Regrade;
 using testing::TemporaryFolder;
 using testing::WriteText;
-
-ProgramOutcome Regrade(const std::vector<std::string>& arguments) {
-  return testing::RunProgram(REGRADE_PROGRAM, arguments);
-}
 
 Vec3d Look(const Vec3d& c) {
   return {0.1 + 0.8 * c.x * c.x, 0.9 * c.y, 0.2 + 0.3 * c.z + 0.3 * c.x};

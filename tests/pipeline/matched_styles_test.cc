@@ -20,11 +20,8 @@ namespace {
 namespace fs = std::filesystem;
 using testing::ProgramOutcome;
 using testing::ReadText;
+using testing::Regrade;
 using testing::TemporaryFolder;
-
-ProgramOutcome Regrade(const std::vector<std::string>& arguments) {
-  return testing::RunProgram(REGRADE_PROGRAM, arguments);
-}
 
 // The mean over the pixels where `mask` is 1, or all.
 Vec3d MeanColor(const Image& image, const Image* mask) {

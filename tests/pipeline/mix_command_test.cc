@@ -20,15 +20,12 @@ namespace regrade {
 namespace {
 
 using testing::ProgramOutcome;
+using testing::Regrade;
 using testing::TemporaryFolder;
 
 std::string Bytes(const std::string& path) {
   std::ifstream file(path, std::ios::binary);
   return {std::istreambuf_iterator<char>(file), {}};
-}
-
-ProgramOutcome Regrade(const std::vector<std::string>& arguments) {
-  return testing::RunProgram(REGRADE_PROGRAM, arguments);
 }
 
 // A scene whose colours know no direction has a style that does, and a film between the two.

@@ -24,13 +24,10 @@ namespace {
 
 namespace fs = std::filesystem;
 using testing::ProgramOutcome;
+using testing::Regrade;
 using testing::TemporaryFolder;
 
 const std::string kStyle = testing::SourceDir() + "/assets/style_sunset.png";
-
-ProgramOutcome Regrade(const std::vector<std::string>& arguments) {
-  return testing::RunProgram(REGRADE_PROGRAM, arguments);
-}
 
 std::vector<std::string> RunOf(const std::string& capture, const std::string& out,
                                const std::vector<std::string>& more = {}) {

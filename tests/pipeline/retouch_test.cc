@@ -33,11 +33,8 @@ using testing::EditErrors;
 using testing::EditTruth;
 using testing::ProgramOutcome;
 using testing::ReadText;
+using testing::Regrade;
 using testing::TemporaryFolder;
-
-ProgramOutcome Regrade(const std::vector<std::string>& arguments) {
-  return testing::RunProgram(REGRADE_PROGRAM, arguments);
-}
 
 constexpr int kViews = 16, kEdited = 6;
 

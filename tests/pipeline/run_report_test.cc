@@ -15,11 +15,8 @@
 namespace regrade {
 namespace {
 
+using testing::Regrade;
 using testing::TemporaryFolder;
-
-testing::ProgramOutcome Regrade(const std::vector<std::string>& arguments) {
-  return testing::RunProgram(REGRADE_PROGRAM, arguments);
-}
 
 int HeatMapFiles(const std::string& folder) {
   int files = 0;

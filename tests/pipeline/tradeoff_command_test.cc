@@ -12,11 +12,8 @@ namespace regrade {
 namespace {
 
 using testing::ProgramOutcome;
+using testing::Regrade;
 using testing::TemporaryFolder;
-
-ProgramOutcome Regrade(const std::vector<std::string>& arguments) {
-  return testing::RunProgram(REGRADE_PROGRAM, arguments);
-}
 
 size_t Count(const std::string& text, const std::string& what) {
   size_t count = 0;

@@ -26,6 +26,14 @@ inline ProgramOutcome RunProgram(const std::string& program,
   return outcome;
 }
 
+inline ProgramOutcome Regrade(const std::vector<std::string>& arguments) {
+  return RunProgram(REGRADE_PROGRAM, arguments);
+}
+
+inline int ExitCodeOf(const std::vector<std::string>& arguments) {
+  return Regrade(arguments).code;
+}
+
 // Options for the smallest possible fit, style and film: three frames, at which it is measured,
 // too.
 inline std::vector<std::string> TinyFlags(const std::string& field = "splats") {
