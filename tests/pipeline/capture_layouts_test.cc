@@ -27,9 +27,7 @@ constexpr int kPhotos = 8;
 class CaptureLayouts : public ::testing::Test {
  protected:
   void SetUp() override {
-    ASSERT_EQ(ExitCodeOf({"synth", folder_ / "s", "--views", std::to_string(kPhotos), "--size",
-                          "96x72"}),
-              0);
+    testing::WriteCapture(folder_ / "s", kPhotos, "96x72");
     const std::string truth = folder_ / "s/truth/transforms.json";
     for (const TransformsFrame& frame : ReadTransformsJson(truth).frames) {
       cameras_.push_back(frame.camera);

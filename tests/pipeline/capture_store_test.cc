@@ -21,7 +21,7 @@ using testing::TemporaryFolder;
 
 TEST(CaptureStore, AnOutputFolderIsACaptureWithItsPoses) {
   const TemporaryFolder folder;
-  ASSERT_EQ(ExitCodeOf({"synth", folder / "s", "--views", "6", "--size", "96x72"}), 0);
+  testing::WriteCapture(folder / "s", 6, "96x72");
   ASSERT_EQ(
       ExitCodeOf({"pose", folder / "s/truth", "--out", folder / "first", "--tracks", "given"}),
       0);
@@ -49,7 +49,7 @@ TEST(CaptureStore, AnOutputFolderIsACaptureWithItsPoses) {
 // What photos.json alone knows of a capture decides about its field's box: it is an input.
 TEST(CaptureStore, ANearestDepthThatChangedIsAnotherCapture) {
   const TemporaryFolder folder;
-  ASSERT_EQ(ExitCodeOf({"synth", folder / "s", "--views", "6", "--size", "96x72"}), 0);
+  testing::WriteCapture(folder / "s", 6, "96x72");
   ASSERT_EQ(
       ExitCodeOf({"pose", folder / "s/truth", "--out", folder / "first", "--tracks", "given"}),
       0);
@@ -70,7 +70,7 @@ TEST(CaptureStore, ANearestDepthThatChangedIsAnotherCapture) {
 
 TEST(CaptureStore, AFolderOfAnotherSchemaIsRefused) {
   const TemporaryFolder folder;
-  ASSERT_EQ(ExitCodeOf({"synth", folder / "s", "--views", "6", "--size", "96x72"}), 0);
+  testing::WriteCapture(folder / "s", 6, "96x72");
   ASSERT_EQ(
       ExitCodeOf({"pose", folder / "s/truth", "--out", folder / "first", "--tracks", "given"}),
       0);
@@ -107,7 +107,7 @@ TEST(PhotoStatuses, LaterOnesDecide) {
 // Refinement needs tracks: an error where it was requested.
 TEST(CaptureStore, PosesWithoutTracksCannotBeRefined) {
   const TemporaryFolder folder;
-  ASSERT_EQ(ExitCodeOf({"synth", folder / "s", "--views", "6", "--size", "96x72"}), 0);
+  testing::WriteCapture(folder / "s", 6, "96x72");
   EXPECT_EQ(ExitCodeOf({"pose", folder / "s/truth", "--out", folder / "out", "--effects",
                         "pose-refinement=on", "--tracks", "given"}),
             6);
@@ -117,7 +117,7 @@ TEST(CaptureStore, PosesWithoutTracksCannotBeRefined) {
 // the missing ones have in the model: no photo may get another's pose.
 TEST(CaptureStore, F61_PosesOfMissingPicturesAreUnused) {
   const TemporaryFolder folder;
-  ASSERT_EQ(ExitCodeOf({"synth", folder / "s", "--views", "6", "--size", "96x72"}), 0);
+  testing::WriteCapture(folder / "s", 6, "96x72");
   ASSERT_EQ(
       ExitCodeOf({"pose", folder / "s/truth", "--out", folder / "all", "--tracks", "given"}),
       0);
@@ -191,7 +191,7 @@ TEST(CaptureStore, PicturesOfAnLlffFile) {
 // A list of poses that names pictures which are not there.
 TEST(CaptureStore, MissingPicturesOfATransformsFileAreReported) {
   const TemporaryFolder folder;
-  ASSERT_EQ(ExitCodeOf({"synth", folder / "s", "--views", "6", "--size", "96x72"}), 0);
+  testing::WriteCapture(folder / "s", 6, "96x72");
   std::filesystem::remove(folder / "s/images/00002.png");
   ASSERT_EQ(
       ExitCodeOf({"pose", folder / "s/truth", "--out", folder / "out", "--tracks", "given"}),

@@ -28,7 +28,7 @@ Vec3d Look(const Vec3d& c) {
 
 TEST(Looks, ALutIsAStyleAndAStyleALut) {
   const TemporaryFolder folder;
-  ASSERT_EQ(Regrade({"synth", folder / "s", "--views", "6", "--size", "96x72"}).code, 0);
+  testing::WriteCapture(folder / "s", 6, "96x72");
   WriteText(folder / "warm.cube", CubeText(TabulateColors(17, Look), "warm"));
   std::vector<std::string> run{"run",     folder / "s/truth",   "--out",    folder / "out",
                                "--style", folder / "warm.cube", "--device", "cpu"};

@@ -40,7 +40,7 @@ std::string Said(std::vector<std::string> arguments, int exit_code = 0) {
 // but the last, somewhere else in each, and masks have it.
 void SynthWithAThing(const TemporaryFolder& folder) {
   Said({"synth", folder / "clean", "--views", std::to_string(kMaskedViews), "--size",
-           "160x120"});
+        "160x120"});
   fs::copy(folder / "clean", folder / "s", fs::copy_options::recursive);
   fs::create_directories(folder / "masks");
   for (int i = 0; i + 1 < kMaskedViews; ++i) {
@@ -96,7 +96,7 @@ TEST(PhotoMasks, MaskedPixelsAreNeitherFittedNorMeasured) {
   // Nor do 2D methods see it, which map a view by its own colours.
   for (const char* out : {"with", "clean_out"})
     Said({"stylize", folder / out, "--style", folder / "clean/images/00008.png",
-             "--style-steps", "1", "--path", "views"});
+          "--style-steps", "1", "--path", "views"});
   const Capture capture = ReadCapture(folder / "with/poses");
   for (const int i : {1, 6}) {
     const Image seen = ReadImage(folder / ("with/styles/00008/views_2d/" + FrameName(i)));
@@ -141,7 +141,7 @@ TEST(PhotoMasks, LaterStagesAndRunsUseTheStagedMasks) {
     const std::string out = folder / ("out" + std::to_string(k));
     fs::copy(folder / "out", out, fs::copy_options::recursive);
     Said({"stylize", out, "--style", folder / "s/images/00016.png", "--method",
-             "folder:" + styled, "--style-steps", "4", "--path", "views"});
+          "folder:" + styled, "--style-steps", "4", "--path", "views"});
     networks[k] = Bytes(out + "/styles/00016/network.npz");
     psnr[k] = ReadJsonFile(out + "/styles/00016/report.json")
                   .At("stages")
@@ -162,8 +162,8 @@ TEST(PhotoMasks, AnEntirelyBlackMaskIsRefused) {
   SynthWithAThing(folder);
   WritePng8(folder / "masks/00003.png", Image(kWidth, kHeight, 1));
   const std::string output = Said({"pose", folder / "s/truth", "--out", folder / "out",
-                                      "--tracks", "given", "--photo-masks", folder / "masks"},
-                                     3);
+                                   "--tracks", "given", "--photo-masks", folder / "masks"},
+                                  3);
   EXPECT_NE(output.find("00003.png"), std::string::npos) << output;
 }
 

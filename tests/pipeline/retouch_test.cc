@@ -330,7 +330,7 @@ TEST(Retouch, ALocalEditIsLearnedFromItsPhotoAlone) {
 
 TEST(Retouch, ARenderIsWrittenToBeEdited) {
   const TemporaryFolder folder;
-  ASSERT_EQ(Regrade({"synth", folder / "s", "--views", "5", "--size", "96x72"}).code, 0);
+  testing::WriteCapture(folder / "s", 5, "96x72");
   std::vector<std::string> reconstruct{"reconstruct",  folder / "s/truth", "--out",
                                        folder / "out", "--device",         "cpu"};
   for (const std::string& flag : testing::TinyFlags()) reconstruct.push_back(flag);
