@@ -6,13 +6,12 @@
 #include <limits>
 #include <vector>
 
+#include "evaluate/frame_pairs.h"
 #include "kernels/base/error.h"
 #include "kernels/image/row_sum.h"
 
 namespace regrade {
 namespace {
-
-int ColourChannels(const Image& image) { return std::min(image.channels, 3); }
 
 void CheckSameKind(const Image& a, const Image& b) {
   REGRADE_CHECK(a.SameSize(b));

@@ -10,18 +10,18 @@ namespace regrade {
 namespace {
 
 constexpr int kDirections = 64;
-constexpr int kBins = 4096;
+constexpr int kQuantileBins = 4096;
 constexpr int kLevels = 1024;
 constexpr int64_t kMaxPixels = 65536;  // per image
-constexpr uint64_t kSeed = 2023;
+constexpr uint64_t kDirectionSeed = 2023;
 const double kExtent = std::sqrt(3.0);  // |d . rgb| for rgb in the unit cube
 
 // Uniform on the sphere: z and the angle around it are uniform (Archimedes).
 std::array<Vec3d, kDirections> MakeDirections() {
   std::array<Vec3d, kDirections> directions;
   for (int i = 0; i < kDirections; ++i) {
-    const double z = 2 * RandomDouble(kSeed, 0, i) - 1;
-    const double angle = 2 * M_PI * RandomDouble(kSeed, 1, i);
+    const double z = 2 * RandomDouble(kDirectionSeed, 0, i) - 1;
+    const double angle = 2 * M_PI * RandomDouble(kDirectionSeed, 1, i);
     const double r = std::sqrt(1 - z * z);
     directions[i] = {r * std::cos(angle), r * std::sin(angle), z};
   }
@@ -58,11 +58,11 @@ void ColourSlices::Add(const Image& image) {
       colours.push_back({std::clamp(rgb.x, 0.0, 1.0), std::clamp(rgb.y, 0.0, 1.0),
                          std::clamp(rgb.z, 0.0, 1.0)});
     }
-  bins_.resize(static_cast<size_t>(kDirections) * kBins);
+  bins_.resize(static_cast<size_t>(kDirections) * kQuantileBins);
 #pragma omp parallel for schedule(static)
   for (int d = 0; d < kDirections; ++d) {
     const Vec3d direction = Directions()[d];
-    int64_t* bins = &bins_[static_cast<size_t>(d) * kBins];
+    int64_t* bins = &bins_[static_cast<size_t>(d) * kQuantileBins];
     // In blocks, so that positions are computed several at a time.
     constexpr size_t kBlock = 256;
     std::array<int, kBlock> bin;
@@ -70,8 +70,8 @@ void ColourSlices::Add(const Image& image) {
       const size_t count = std::min(kBlock, colours.size() - begin);
       for (size_t i = 0; i < count; ++i) {
         const double position =
-            (Dot(direction, colours[begin + i]) + kExtent) / (2 * kExtent) * kBins;
-        bin[i] = std::clamp(static_cast<int>(position), 0, kBins - 1);
+            (Dot(direction, colours[begin + i]) + kExtent) / (2 * kExtent) * kQuantileBins;
+        bin[i] = std::clamp(static_cast<int>(position), 0, kQuantileBins - 1);
       }
       for (size_t i = 0; i < count; ++i) ++bins[bin[i]];
     }
@@ -80,16 +80,16 @@ void ColourSlices::Add(const Image& image) {
 }
 
 std::vector<double> ColourSlices::Quantiles(int direction) const {
-  const int64_t* bins = &bins_[static_cast<size_t>(direction) * kBins];
+  const int64_t* bins = &bins_[static_cast<size_t>(direction) * kQuantileBins];
   std::vector<double> quantiles(kLevels);
   int bin = 0;
   int64_t below = 0;  // pixels in bins before `bin`
   for (int k = 0; k < kLevels; ++k) {
     const double rank = (k + 0.5) / kLevels * static_cast<double>(count_);
-    while (bin + 1 < kBins && static_cast<double>(below + bins[bin]) < rank)
+    while (bin + 1 < kQuantileBins && static_cast<double>(below + bins[bin]) < rank)
       below += bins[bin++];
     const double within = (rank - static_cast<double>(below)) / static_cast<double>(bins[bin]);
-    quantiles[k] = (bin + within) / kBins * 2 * kExtent - kExtent;
+    quantiles[k] = (bin + within) / kQuantileBins * 2 * kExtent - kExtent;
   }
   return quantiles;
 }

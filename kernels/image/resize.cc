@@ -9,16 +9,16 @@ namespace regrade {
 namespace {
 
 // One new pixel as a weighted mean of old pixels first, first + 1, ...; weights sum to 1.
-struct Taps {
+struct PixelTaps {
   int first = 0;
   std::vector<double> weights;
 };
 
-std::vector<Taps> AxisTaps(int old_size, int new_size) {
-  std::vector<Taps> taps(new_size);
+std::vector<PixelTaps> AxisTaps(int old_size, int new_size) {
+  std::vector<PixelTaps> taps(new_size);
   const double scale = static_cast<double>(old_size) / new_size;  // old pixels per new pixel
   for (int i = 0; i < new_size; ++i) {
-    Taps& t = taps[i];
+    PixelTaps& t = taps[i];
     if (new_size == old_size) {
       t = {i, {1.0}};
     } else if (new_size < old_size) {
@@ -64,18 +64,18 @@ Image Resize(const Image& source, int width, int height) {
   REGRADE_CHECK_GT(height, 0);
   REGRADE_CHECK(!source.empty());
   if (width == source.width && height == source.height) return source;
-  const std::vector<Taps> columns = AxisTaps(source.width, width);
-  const std::vector<Taps> rows = AxisTaps(source.height, height);
+  const std::vector<PixelTaps> columns = AxisTaps(source.width, width);
+  const std::vector<PixelTaps> rows = AxisTaps(source.height, height);
   const int channels = source.channels;
   Image result(width, height, channels);
 #pragma omp parallel for schedule(static)
   for (int y = 0; y < height; ++y) {
     std::vector<double> sums(static_cast<size_t>(source.width) * channels);
-    const Taps& row = rows[y];
+    const PixelTaps& row = rows[y];
     for (size_t k = 0; k < row.weights.size(); ++k)
       AddRow(source, row.first + static_cast<int>(k), row.weights[k], &sums);
     for (int x = 0; x < width; ++x) {
-      const Taps& column = columns[x];
+      const PixelTaps& column = columns[x];
       double value[4] = {};
       for (size_t k = 0; k < column.weights.size(); ++k)
         for (int c = 0; c < channels; ++c)

@@ -13,7 +13,7 @@ namespace regrade {
 namespace {
 
 constexpr int kColumns = 17;
-constexpr int kMaxSide = 1 << 16;  // pixels
+constexpr int kMaxLlffSide = 1 << 16;  // pixels
 constexpr uint64_t kMaxBytes = 16 << 20;
 constexpr double kRigidTolerance = 1e-2;
 
@@ -26,7 +26,8 @@ Camera CameraOf(const std::string& path, size_t row, const double* v) {
   const auto at = [v](int i, int j) { return v[5 * i + j]; };
   Camera camera;
   const double height = at(0, 4), width = at(1, 4), focal = at(2, 4);
-  if (!(width >= 1 && width <= kMaxSide && height >= 1 && height <= kMaxSide && focal > 0))
+  if (!(width >= 1 && width <= kMaxLlffSide && height >= 1 && height <= kMaxLlffSide &&
+        focal > 0))
     Refuse(path, row, "its size or focal length is implausible");
   camera.width = static_cast<int>(std::lround(width));
   camera.height = static_cast<int>(std::lround(height));

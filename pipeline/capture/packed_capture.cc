@@ -13,7 +13,7 @@ namespace {
 constexpr int32_t kVersion = 1;
 constexpr int64_t kCameraValues = 27;  // see PackCamera
 constexpr uint64_t kBudget = uint64_t{16} << 30;
-constexpr int64_t kMaxSide = 1 << 14;
+constexpr int64_t kMaxPackedSide = 1 << 14;
 constexpr int kMaxVertices = 4096;  // along an axis, as in field files
 
 // width, height, fx, fy, cx, cy, lens, distortion [8], rotation [9] by rows, translation [3].
@@ -33,8 +33,8 @@ void PackCamera(const Camera& camera, double* v) {
 
 Camera UnpackCamera(const double* v, const std::string& where) {
   if (!std::all_of(v, v + kCameraValues, [](double x) { return std::isfinite(x); }) ||
-      !(v[0] >= 1 && v[0] <= kMaxSide && v[1] >= 1 && v[1] <= kMaxSide && v[2] > 0 &&
-        v[3] > 0 && v[6] >= 0 && v[6] <= static_cast<double>(LensModel::kFisheye)))
+      !(v[0] >= 1 && v[0] <= kMaxPackedSide && v[1] >= 1 && v[1] <= kMaxPackedSide &&
+        v[2] > 0 && v[3] > 0 && v[6] >= 0 && v[6] <= static_cast<double>(LensModel::kFisheye)))
     throw InputError("a camera is out of range", where, "pack the capture again");
   Camera camera;
   camera.width = static_cast<int>(v[0]);
@@ -202,7 +202,7 @@ PackedCapture ReadPackedCapture(const std::string& path) {
   CheckScene(capture.scene, path);
   if (file.Has("style")) {
     const NpzArray style = file.Read("style", ArrayType::kU8, {-1, -1, 3});
-    if (style.shape[0] > kMaxSide || style.shape[1] > kMaxSide)
+    if (style.shape[0] > kMaxPackedSide || style.shape[1] > kMaxPackedSide)
       throw InputError("is too large", path + ": style", "pack the capture again");
     capture.style = UnpackPixels(style.bytes.data(), static_cast<int>(style.shape[1]),
                                  static_cast<int>(style.shape[0]));

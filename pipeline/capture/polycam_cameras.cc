@@ -11,7 +11,7 @@
 namespace regrade {
 namespace {
 
-constexpr double kMaxSide = 1 << 16;  // pixels
+constexpr double kMaxPolycamSide = 1 << 16;  // pixels
 constexpr uint64_t kMaxBytes = 1 << 20;
 
 double NumberOf(const std::string& path, const JsonValue& top, const std::string& key) {
@@ -23,7 +23,7 @@ double NumberOf(const std::string& path, const JsonValue& top, const std::string
 
 int SideOf(const std::string& path, const JsonValue& top, const std::string& key) {
   const double side = NumberOf(path, top, key);
-  if (!(side >= 1 && side <= kMaxSide) || side != std::floor(side))
+  if (!(side >= 1 && side <= kMaxPolycamSide) || side != std::floor(side))
     throw InputError(key + " is not a number of pixels", PlaceIn(path, top.At(key)));
   return static_cast<int>(side);
 }

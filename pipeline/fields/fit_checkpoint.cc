@@ -6,7 +6,7 @@ namespace regrade {
 namespace {
 
 // Of a uniform grid's state, and of one with cells in place of links.
-constexpr uint32_t kUniformVersion = 2, kCellsVersion = 3;
+constexpr uint32_t kUniformCheckpoint = 2, kCellsCheckpoint = 3;
 
 bool Consistent(const FastGrid& grid) {
   if (grid.basis != 1 && grid.basis != 4 && grid.basis != 9) return false;
@@ -97,7 +97,7 @@ void UnpackTally(ByteUnpacker* unpacker, FitTally* tally) {
 BytePacker PackFitState(const FitState& state, const std::string& note) {
   const FastGrid& grid = state.grid;
   BytePacker packer;
-  packer.Value(grid.cells().on() ? kCellsVersion : kUniformVersion);
+  packer.Value(grid.cells().on() ? kCellsCheckpoint : kUniformCheckpoint);
   packer.Values(note);
   packer.Value(grid.basis);
   packer.Value(state.stage);
@@ -129,7 +129,7 @@ std::optional<FitState> UnpackFitState(std::string_view bytes, std::string* note
   FastGrid& grid = state.grid;
   uint32_t version = 0;
   unpacker.Value(&version);
-  if (version != kUniformVersion && version != kCellsVersion) return std::nullopt;
+  if (version != kUniformCheckpoint && version != kCellsCheckpoint) return std::nullopt;
   std::string unwanted;
   unpacker.Values(note != nullptr ? note : &unwanted);
   unpacker.Value(&grid.basis);
@@ -144,7 +144,7 @@ std::optional<FitState> UnpackFitState(std::string_view bytes, std::string* note
   unpacker.Value(&grid.near_clip);
   UnpackTally(&unpacker, &state.tally);
   unpacker.Values(&grid.links);
-  if (version == kCellsVersion && !UnpackCells(&unpacker, &grid)) return std::nullopt;
+  if (version == kCellsCheckpoint && !UnpackCells(&unpacker, &grid)) return std::nullopt;
   unpacker.Values(&grid.records);
   unpacker.Values(&state.second_moment);
   if (unpacker.ok() && !unpacker.at_end()) {

@@ -5,7 +5,7 @@
 namespace regrade {
 namespace {
 
-constexpr uint32_t kVersion = 4;
+constexpr uint32_t kNetworkCheckpoint = 4;
 
 // Lists the members once for both directions.
 template <typename Visitor, typename State>
@@ -65,7 +65,7 @@ struct Unpacking {
 
 std::string PackTrainingState(const TrainingState& state) {
   Packing packing;
-  packing.packer.Value(kVersion);
+  packing.packer.Value(kNetworkCheckpoint);
   Visit(&packing, &state);
   return packing.packer.Joined();
 }
@@ -74,7 +74,7 @@ std::optional<TrainingState> UnpackTrainingState(std::string_view bytes) {
   Unpacking unpacking{ByteUnpacker(bytes)};
   uint32_t version = 0;
   unpacking.Value(&version);
-  if (version != kVersion) return std::nullopt;
+  if (version != kNetworkCheckpoint) return std::nullopt;
   TrainingState state;
   Visit(&unpacking, &state);
   if (!unpacking.unpacker.at_end()) return std::nullopt;

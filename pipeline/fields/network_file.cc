@@ -10,14 +10,14 @@
 namespace regrade {
 namespace {
 
-constexpr int32_t kVersion = 2;
+constexpr int32_t kNetworkVersion = 2;
 constexpr uint64_t kBudget = uint64_t{1} << 20;  // the arrays are 120 KB
 
 // The bound is a product of singular values in double: another machine differs in the last
 // digits, a changed weight in the first ones.
 constexpr double kBoundTolerance = 1e-9;
 
-[[noreturn]] void Refuse(const std::string& path, const std::string& why) {
+[[noreturn]] void RefuseNetwork(const std::string& path, const std::string& why) {
   throw InputError(why, path, "run regrade stylize again");
 }
 
@@ -61,16 +61,17 @@ void WriteNetworkFile(const std::string& path, const StoredNetwork& stored) {
   file.AddScalar<double>("bound", stored.network.Bound());
   file.AddScalar<double>("k_est", stored.k_est);
   file.Add("background", {3}, &stored.background.x);
-  file.AddScalar<int32_t>("regrade_version", kVersion);
+  file.AddScalar<int32_t>("regrade_version", kNetworkVersion);
   file.WriteTo(path);
 }
 
 StoredNetwork ReadNetworkFile(const std::string& path) {
   NpzReader file(path, kBudget);
-  RefuseNewerFormat(&file, kVersion);
-  if (const int32_t version = file.ReadScalar<int32_t>("regrade_version"); version < kVersion)
-    Refuse(path, Concat("format ", version, ", older than ", kVersion,
-                        ", the only one that is read"));
+  RefuseNewerFormat(&file, kNetworkVersion);
+  if (const int32_t version = file.ReadScalar<int32_t>("regrade_version");
+      version < kNetworkVersion)
+    RefuseNetwork(path, Concat("format ", version, ", older than ", kNetworkVersion,
+                               ", the only one that is read"));
   const NpzArray last = file.Read(Named("bias", kNetworkLayers - 1), ArrayType::kF32, {-1});
   LipschitzNetwork network(last.shape[0] == kLargestRow.sh() ? kMaxBasis : kMaxVoxelBasis);
   VisitLayers(&network, [&file](const std::string& name, const std::vector<int64_t>& shape,
@@ -95,13 +96,13 @@ StoredNetwork ReadNetworkFile(const std::string& path) {
   StoredNetwork stored{LipschitzNetwork(std::move(data)),
                        file.ReadScalar<double>("k_est"),
                        {color[0], color[1], color[2]}};
-  if (!std::isfinite(stored.k_est)) Refuse(path, "k_est is not finite");
+  if (!std::isfinite(stored.k_est)) RefuseNetwork(path, "k_est is not finite");
   for (int c = 0; c < 3; ++c)
-    if (!std::isfinite(color[c])) Refuse(path, "the background is not finite");
+    if (!std::isfinite(color[c])) RefuseNetwork(path, "the background is not finite");
   const double guaranteed = file.ReadScalar<double>("bound"), bound = stored.network.Bound();
   if (!(std::abs(guaranteed - bound) <= kBoundTolerance * bound))
-    Refuse(path, "it guarantees the bound " + std::to_string(guaranteed) +
-                     ", its weights have " + std::to_string(bound));
+    RefuseNetwork(path, "it guarantees the bound " + std::to_string(guaranteed) +
+                            ", its weights have " + std::to_string(bound));
   return stored;
 }
 

@@ -8,7 +8,7 @@
 namespace regrade {
 namespace {
 
-constexpr int32_t kVersion = 2;
+constexpr int32_t kObjectVersion = 2;
 
 }  // namespace
 
@@ -28,13 +28,13 @@ void WriteObjectFile(const std::string& path, const ObjectWeights& weights) {
   NpzWriter file;
   file.Add("weights", {std::ssize(weights.regions), std::ssize(weights.all)}, values.data(),
            NpzPacking::kDeflate);
-  file.AddScalar<int32_t>("regrade_version", kVersion);
+  file.AddScalar<int32_t>("regrade_version", kObjectVersion);
   file.WriteTo(path);
 }
 
 ObjectWeights ReadObjectFile(const std::string& path, int64_t voxels) {
   NpzReader file(path, uint64_t{16} << 30);
-  RefuseNewerFormat(&file, kVersion);
+  RefuseNewerFormat(&file, kObjectVersion);
   const NpzArray array = file.Read("weights", ArrayType::kF32, {-1, voxels});
   const int64_t regions = array.shape[0];
   if (regions < 1 || regions > kMostObjectRegions)

@@ -9,7 +9,7 @@
 namespace regrade {
 namespace {
 
-constexpr int32_t kVersion = 1;
+constexpr int32_t kResidualVersion = 1;
 constexpr float kNothing = 0.25f / 255;
 constexpr float kLargest = 64;  // no colour is further than a few units from another
 
@@ -40,13 +40,13 @@ void WriteResidualFile(const std::string& path, const VoxelResidual& residual) {
   NpzWriter file;
   file.Add("residual", {voxels, 3}, values.data(), NpzPacking::kDeflate);
   if (!scales.empty()) file.Add("view_scale", {voxels, 3}, scales.data(), NpzPacking::kDeflate);
-  file.AddScalar<int32_t>("regrade_version", kVersion);
+  file.AddScalar<int32_t>("regrade_version", kResidualVersion);
   file.WriteTo(path);
 }
 
 VoxelResidual ReadResidualFile(const std::string& path, int64_t voxels) {
   NpzReader file(path, uint64_t{16} << 30);
-  RefuseNewerFormat(&file, kVersion);
+  RefuseNewerFormat(&file, kResidualVersion);
   VoxelResidual residual;
   residual.color = ReadColors(&file, "residual", voxels, -kLargest, kLargest, path);
   if (file.Has("view_scale"))

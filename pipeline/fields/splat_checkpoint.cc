@@ -3,7 +3,7 @@
 namespace regrade {
 namespace {
 
-constexpr uint32_t kVersion = 0x5350'0001;  // no version of a voxel fit's
+constexpr uint32_t kSplatCheckpoint = 0x5350'0001;  // no version of a voxel fit's
 
 // Calls visit for every value of the state but its arrays, the curve and the note.
 template <typename State, typename Visit>
@@ -35,7 +35,7 @@ bool Consistent(const Splats& splats, size_t n, int basis) {
 
 BytePacker PackSplatFitState(const SplatFitState& state, const std::string& note) {
   BytePacker packer;
-  packer.Value(kVersion);
+  packer.Value(kSplatCheckpoint);
   packer.Values(note);
   VisitValues(&state, [&](const auto* value) { packer.Value(*value); });
   packer.Value(static_cast<int64_t>(state.tally.curve.size()));
@@ -54,7 +54,7 @@ std::optional<SplatFitState> UnpackSplatFitState(std::string_view bytes, std::st
   SplatFitState state;
   uint32_t version = 0;
   unpacker.Value(&version);
-  if (version != kVersion) return std::nullopt;
+  if (version != kSplatCheckpoint) return std::nullopt;
   unpacker.Values(note);
   VisitValues(&state, [&](auto* value) { unpacker.Value(value); });
   int64_t points = 0;

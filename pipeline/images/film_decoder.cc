@@ -38,7 +38,7 @@ constexpr int kMostThreads = 8;  // each holds a frame
 // A frame needs a few packets at most; more do not lead to any.
 constexpr int64_t kTriesPerFrame = 16;
 
-constexpr char kConvert[] = "copy the file again from the camera, or convert it to MP4";
+constexpr char kCopyOrConvert[] = "copy the file again from the camera, or convert it to MP4";
 
 }  // namespace
 
@@ -63,7 +63,8 @@ struct FilmDecoder::State {
   }
   void CheckOpen(int code, const char* step) const {
     if (code < 0)
-      Refuse(std::string("cannot read this film: ") + step + ": " + ErrorText(code), kConvert);
+      Refuse(std::string("cannot read this film: ") + step + ": " + ErrorText(code),
+             kCopyOrConvert);
   }
   [[noreturn]] void RefuseLong() const {
     Refuse(Format("a film of more than %.0f minutes, %lld frames or %.0f gigapixels",
@@ -180,7 +181,8 @@ struct FilmDecoder::State {
     scaler.reset(sws_getCachedContext(scaler.release(), frame->width, frame->height,
                                       static_cast<AVPixelFormat>(frame->format), width, height,
                                       format, flags, nullptr, nullptr, nullptr));
-    if (scaler == nullptr) Refuse("its pixels have a form that cannot be converted", kConvert);
+    if (scaler == nullptr)
+      Refuse("its pixels have a form that cannot be converted", kCopyOrConvert);
     // A film that does not name its matrix has BT.601's where it is small, else BT.709's.
     const bool unnamed =
         frame->colorspace == AVCOL_SPC_UNSPECIFIED || frame->colorspace == AVCOL_SPC_RGB;
@@ -225,7 +227,7 @@ bool FilmDecoder::Next() {
   for (;;) {
     const int code = avcodec_receive_frame(s.decoder.get(), s.frame.get());
     if (code == AVERROR_EOF || (code == AVERROR(EAGAIN) && s.flushed)) {
-      if (s.frames == 0) s.Refuse("no frame of this film can be decoded", kConvert);
+      if (s.frames == 0) s.Refuse("no frame of this film can be decoded", kCopyOrConvert);
       return false;
     }
     if (code == AVERROR(EAGAIN)) {

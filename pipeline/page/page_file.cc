@@ -12,20 +12,21 @@
 namespace regrade {
 namespace {
 
-double Rounded(double value) { return std::round(value * 1e9) / 1e9; }
+double ToNineDigits(double value) { return std::round(value * 1e9) / 1e9; }
 
 template <typename T>
 JsonValue::Array ArrayOf(const Vec3<T>& v) {
-  return {Rounded(v.x), Rounded(v.y), Rounded(v.z)};
+  return {ToNineDigits(v.x), ToNineDigits(v.y), ToNineDigits(v.z)};
 }
 
 JsonValue CameraJson(const Camera& camera) {
   JsonValue::Array rotation;
   for (const Vec3d& row : camera.camera_from_world.rotation.row)
-    for (int a = 0; a < 3; ++a) rotation.push_back(Rounded(row[a]));
-  return JsonValue::Object{{"center", ArrayOf(camera.Center())}, {"fx", Rounded(camera.fx)},
-                           {"fy", Rounded(camera.fy)},           {"height", camera.height},
-                           {"rotation", std::move(rotation)},    {"width", camera.width}};
+    for (int a = 0; a < 3; ++a) rotation.push_back(ToNineDigits(row[a]));
+  return JsonValue::Object{
+      {"center", ArrayOf(camera.Center())}, {"fx", ToNineDigits(camera.fx)},
+      {"fy", ToNineDigits(camera.fy)},      {"height", camera.height},
+      {"rotation", std::move(rotation)},    {"width", camera.width}};
 }
 
 // "sha256-...": the hash of a policy, from hexadecimal digits.
@@ -80,10 +81,11 @@ JsonValue Header(const PageContent& content, const PageCheck* check) {
                                        {"covariance", std::move(covariance)}};
   header["photos"] = std::move(photos);
   header["styles"] = std::move(styles);
-  header["check"] = check == nullptr
-                        ? JsonValue()
-                        : JsonValue(JsonValue::Object{{"views", check->views},
-                                                      {"worst_db", Rounded(check->worst_db)}});
+  header["check"] =
+      check == nullptr
+          ? JsonValue()
+          : JsonValue(JsonValue::Object{{"views", check->views},
+                                        {"worst_db", ToNineDigits(check->worst_db)}});
   return header;
 }
 

@@ -14,7 +14,7 @@ namespace {
 
 constexpr int64_t kCoarsePart = 6;  // of all splats, one of so many
 
-int16_t Rounded(double value) {
+int16_t RoundedNumber(double value) {
   const double most = kMaxNumber;
   return static_cast<int16_t>(std::floor(std::clamp(value, -most, most) + 0.5));
 }
@@ -64,13 +64,13 @@ SplatNumbers NumbersOfSplat(const Splat<float>& splat, const GridFrame& box) {
   SplatNumbers numbers;
   for (size_t a = 0; a < 3; ++a) {
     const int i = static_cast<int>(a);
-    numbers[a] = Rounded(p[a] * shrunk / kPositionStep);
-    numbers[3 + a] = Rounded(
+    numbers[a] = RoundedNumber(p[a] * shrunk / kPositionStep);
+    numbers[3 + a] = RoundedNumber(
         std::clamp(double{splat.log_scale[i]}, -kMaxLogScale, kMaxLogScale) / kLogScaleStep);
-    numbers[6 + a] = Rounded(sign * double{turned[front][a + 1]} / kRotationStep);
+    numbers[6 + a] = RoundedNumber(sign * double{turned[front][a + 1]} / kRotationStep);
   }
   const double opacity = std::exp(LogSigmoid(double{splat.opacity_logit}));
-  numbers[9] = std::min<int16_t>(Rounded(opacity * kOpacitySteps), kOpacitySteps - 1);
+  numbers[9] = std::min<int16_t>(RoundedNumber(opacity * kOpacitySteps), kOpacitySteps - 1);
   return numbers;
 }
 

@@ -33,7 +33,7 @@ struct Chunk {
 constexpr std::array<const char*, 4> kPacked = {"packed_position", "packed_rotation",
                                                 "packed_scale", "packed_color"};
 
-[[noreturn]] void Refuse(const std::string& why, const std::string& where) {
+[[noreturn]] void RefuseCompressed(const std::string& why, const std::string& where) {
   throw InputError("compressed PLY: " + why, where,
                    "convert it again (`splat-transform IN OUT.ply`)");
 }
@@ -44,7 +44,8 @@ size_t Column(const PlyElement& element, const std::string& name, PlyType type,
   const std::optional<size_t> found = element.Find(name);
   if (!found || element.properties[*found].count_type ||
       element.properties[*found].type != type)
-    Refuse("element '" + element.name + "' has no " + name + ", or of another type", where);
+    RefuseCompressed("element '" + element.name + "' has no " + name + ", or of another type",
+                     where);
   return *found;
 }
 
@@ -128,7 +129,8 @@ SplatRecord Unpack(const Chunk& chunk, const std::array<uint32_t, 4>& packed, in
 std::vector<size_t> HarmonicColumns(const PlyElement& element, const std::string& where) {
   const size_t count = element.properties.size();
   if (count != 9 && count != 24 && count != 45)
-    Refuse(Concat("element 'sh' has ", count, " properties; 9, 24 or 45 are read"), where);
+    RefuseCompressed(Concat("element 'sh' has ", count, " properties; 9, 24 or 45 are read"),
+                     where);
   std::vector<size_t> columns;
   for (size_t k = 0; k < count; ++k)
     columns.push_back(Column(element, Concat("f_rest_", k), PlyType::kU8, where));
@@ -150,14 +152,16 @@ bool IsCompressedPly(const PlyHeader& header) {
 
 SplatScene ReadCompressedPly(std::string_view bytes, const PlyHeader& header, uint64_t budget,
                              const std::string& where) {
-  if (header.encoding == PlyEncoding::kAscii) Refuse("a text, which no program writes", where);
+  if (header.encoding == PlyEncoding::kAscii)
+    RefuseCompressed("a text, which no program writes", where);
   const std::vector<Chunk> chunks = ReadChunks(bytes, header, where);
   const size_t vertex = *header.Find("vertex");
   const PlyElement& vertices = header.elements[vertex];
   std::array<size_t, 4> packed{};
   for (size_t i = 0; i < 4; ++i) packed[i] = Column(vertices, kPacked[i], PlyType::kU32, where);
   if (vertices.count / kChunk + (vertices.count % kChunk > 0) != chunks.size())
-    Refuse(Concat(vertices.count, " splats in ", chunks.size(), " chunks of ", kChunk), where);
+    RefuseCompressed(
+        Concat(vertices.count, " splats in ", chunks.size(), " chunks of ", kChunk), where);
   PlyRows rows(bytes, header, vertex, where);
 
   const std::optional<size_t> sh = header.Find("sh");
@@ -166,7 +170,7 @@ SplatScene ReadCompressedPly(std::string_view bytes, const PlyHeader& header, ui
   if (sh) {
     columns = HarmonicColumns(header.elements[*sh], where);
     if (header.elements[*sh].count != vertices.count)
-      Refuse("its elements 'vertex' and 'sh' differ in their numbers", where);
+      RefuseCompressed("its elements 'vertex' and 'sh' differ in their numbers", where);
     harmonics.emplace(bytes, header, *sh, where);
   }
   const int others = static_cast<int>(columns.size() / 3), basis = 1 + others;

@@ -22,7 +22,7 @@ constexpr TypeName kTypes[] = {{"char", "int8", 1},     {"uchar", "uint8", 1},
                                {"int", "int32", 4},     {"uint", "uint32", 4},
                                {"float", "float32", 4}, {"double", "float64", 8}};
 
-[[noreturn]] void Refuse(const std::string& why, const std::string& where) {
+[[noreturn]] void RefuseHeader(const std::string& why, const std::string& where) {
   throw InputError("PLY header: " + why, where,
                    "the file is damaged or was not written by a splat program");
 }
@@ -30,14 +30,14 @@ constexpr TypeName kTypes[] = {{"char", "int8", 1},     {"uchar", "uint8", 1},
 PlyType TypeOf(const std::string& word, const std::string& where) {
   for (size_t i = 0; i < std::size(kTypes); ++i)
     if (word == kTypes[i].name || word == kTypes[i].sized_name) return static_cast<PlyType>(i);
-  Refuse("'" + Printable(word) + "' is not a type of numbers", where);
+  RefuseHeader("'" + Printable(word) + "' is not a type of numbers", where);
 }
 
 PlyEncoding EncodingOf(const std::string& word, const std::string& where) {
   if (word == "ascii") return PlyEncoding::kAscii;
   if (word == "binary_little_endian") return PlyEncoding::kLittleEndian;
   if (word == "binary_big_endian") return PlyEncoding::kBigEndian;
-  Refuse("'" + Printable(word) + "' is not an encoding", where);
+  RefuseHeader("'" + Printable(word) + "' is not an encoding", where);
 }
 
 // Words between spaces and tabs.
@@ -55,7 +55,7 @@ std::vector<std::string> WordsOf(std::string_view line) {
 PlyElement ElementOf(const std::vector<std::string>& words, const std::string& where) {
   PlyElement element;
   if (words.size() != 3 || !ParseNumber(words[2], &element.count))
-    Refuse("an element without a name and a count", where);
+    RefuseHeader("an element without a name and a count", where);
   element.name = words[1];
   return element;
 }
@@ -63,10 +63,11 @@ PlyElement ElementOf(const std::vector<std::string>& words, const std::string& w
 PlyProperty PropertyOf(const std::vector<std::string>& words, const std::string& where) {
   PlyProperty property;
   const bool list = words.size() == 5 && words[1] == "list";
-  if (!list && words.size() != 3) Refuse("a property without a type and a name", where);
+  if (!list && words.size() != 3) RefuseHeader("a property without a type and a name", where);
   if (list) {
     property.count_type = TypeOf(words[2], where);
-    if (!IsInteger(*property.count_type)) Refuse("a list whose count is a fraction", where);
+    if (!IsInteger(*property.count_type))
+      RefuseHeader("a list whose count is a fraction", where);
   }
   property.type = TypeOf(words[words.size() - 2], where);
   property.name = words.back();
@@ -105,13 +106,13 @@ bool LooksLikePly(std::string_view bytes) {
 }
 
 PlyHeader ParsePlyHeader(std::string_view bytes, const std::string& where) {
-  if (!LooksLikePly(bytes)) Refuse("the first line is not 'ply'", where);
+  if (!LooksLikePly(bytes)) RefuseHeader("the first line is not 'ply'", where);
   PlyHeader header;
   header.line_end = bytes[3] == '\r' ? "\r\n" : "\n";
   std::unordered_set<std::string> names, element_names;
   for (size_t at = bytes.find('\n') + 1;;) {
     const size_t end = bytes.substr(0, kMostBytes).find('\n', at);
-    if (end == std::string_view::npos) Refuse("it has no end ('end_header')", where);
+    if (end == std::string_view::npos) RefuseHeader("it has no end ('end_header')", where);
     std::string_view line = bytes.substr(at, end - at);
     at = end + 1;
     if (line.ends_with('\r')) line.remove_suffix(1);
@@ -120,7 +121,7 @@ PlyHeader ParsePlyHeader(std::string_view bytes, const std::string& where) {
     if (header.after_format == 0 && !words.empty() && keyword != "comment" &&
         keyword != "obj_info") {
       if (keyword != "format" || words.size() != 3)
-        Refuse("it does not name its encoding", where);
+        RefuseHeader("it does not name its encoding", where);
       header.encoding = EncodingOf(words[1], where);
       header.after_format = at;
     } else if (keyword == "comment" || keyword == "obj_info") {
@@ -129,17 +130,17 @@ PlyHeader ParsePlyHeader(std::string_view bytes, const std::string& where) {
       header.elements.push_back(ElementOf(words, where));
       names.clear();
       if (!element_names.insert(words[1]).second)
-        Refuse("the element '" + Printable(words[1]) + "' appears twice", where);
+        RefuseHeader("the element '" + Printable(words[1]) + "' appears twice", where);
     } else if (keyword == "property") {
-      if (header.elements.empty()) Refuse("a property without an element", where);
+      if (header.elements.empty()) RefuseHeader("a property without an element", where);
       header.elements.back().properties.push_back(PropertyOf(words, where));
       if (!names.insert(words.back()).second)
-        Refuse("the property '" + Printable(words.back()) + "' appears twice", where);
+        RefuseHeader("the property '" + Printable(words.back()) + "' appears twice", where);
     } else if (keyword == "end_header") {
       header.bytes = at;
       return header;
     } else if (!words.empty()) {
-      Refuse("a line begins with '" + Printable(keyword.substr(0, 40)) + "'", where);
+      RefuseHeader("a line begins with '" + Printable(keyword.substr(0, 40)) + "'", where);
     }
   }
 }

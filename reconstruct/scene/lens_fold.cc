@@ -9,7 +9,7 @@ namespace {
 // Steps from the axis to the border where the lens does not distort, and the most that are
 // taken: a wide lens's picture goes on for many times its undistorted width.
 constexpr int kSteps = 400, kMostSteps = 20 * kSteps;
-constexpr double kRounding = 0.5;  // pixels that a border may be short of
+constexpr double kBorderRounding = 0.5;  // pixels that a border may be short of
 
 // Of a fisheye lens the distance grows with the ray's angle, else with its tangent.
 Vec3d RayAt(const Camera& camera, double along, double x, double y) {
@@ -22,7 +22,7 @@ double FoldTowards(const Camera& camera, double u, double v) {
   const double xd = (u - camera.cx) / camera.fx, yd = (v - camera.cy) / camera.fy;
   const double border = std::hypot(xd, yd);
   const double border_px = std::hypot(u - camera.cx, v - camera.cy);
-  if (!(border_px > kRounding)) return 0;
+  if (!(border_px > kBorderRounding)) return 0;
   double before = 0;
   for (int i = 1; i <= kMostSteps; ++i) {
     const Vec3d ray = RayAt(camera, border * i / kSteps, xd / border, yd / border);
@@ -30,8 +30,8 @@ double FoldTowards(const Camera& camera, double u, double v) {
     // A fisheye lens's rays from behind its image plane are not projected.
     if (!camera.Project(ray, &there_u, &there_v)) return 0;
     const double here = std::hypot(there_u - camera.cx, there_v - camera.cy);
-    if (!(here > before)) return std::max(before, kRounding);
-    if (here >= border_px - kRounding) return 0;
+    if (!(here > before)) return std::max(before, kBorderRounding);
+    if (here >= border_px - kBorderRounding) return 0;
     before = here;
   }
   return before;

@@ -14,7 +14,7 @@ using RowMatrixF = Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::R
 
 constexpr int64_t kBlock = 4096;  // pixels taken to double at a time
 
-Eigen::Map<const RowMatrixF> View(const FeatureMap& f) {
+Eigen::Map<const RowMatrixF> RowsOf(const FeatureMap& f) {
   return {f.values.data(), f.channels, f.num_pixels()};
 }
 Eigen::Map<const RowMatrix> SquareOf(const std::vector<double>& m, int n) {
@@ -61,7 +61,7 @@ RowMatrix CholeskyFactor(const FeatureStatistics& statistics) {
 }  // namespace
 
 FeatureStatistics MeasureFeatures(const FeatureMap& features, int fewer) {
-  const auto view = View(features);
+  const auto view = RowsOf(features);
   const int64_t count = features.num_pixels();
   REGRADE_CHECK_GT(count, 0);
   const int n = features.channels;

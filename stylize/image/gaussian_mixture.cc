@@ -11,9 +11,9 @@
 namespace regrade {
 namespace {
 
-constexpr int kMostIterations = 200;
-constexpr double kLeastGain = 1e-5;  // nats a colour
-constexpr int64_t kBlock = 512;      // colours summed by one thread
+constexpr int kMostMixtureIterations = 200;
+constexpr double kLeastGain = 1e-5;   // nats a colour
+constexpr int64_t kColorBlock = 512;  // colours summed by one thread
 
 // Sums over colours, about the part's last mean, which the new one approaches.
 struct PartSums {
@@ -42,14 +42,14 @@ struct Expectation {
 Expectation Expect(const GaussianMixture& mixture, const std::vector<Vec3d>& colors) {
   const size_t parts = mixture.size();
   const std::vector<PartDensity> densities = DensitiesOf(mixture, 0);
-  const int64_t count = std::ssize(colors), blocks = (count + kBlock - 1) / kBlock;
+  const int64_t count = std::ssize(colors), blocks = (count + kColorBlock - 1) / kColorBlock;
   std::vector<Expectation> of_blocks(static_cast<size_t>(blocks));
 #pragma omp parallel for schedule(static)
   for (int64_t block = 0; block < blocks; ++block) {
     Expectation& sums = of_blocks[static_cast<size_t>(block)];
     sums.parts.resize(parts);
     std::vector<double> shares(parts);
-    for (int64_t i = block * kBlock; i < std::min(count, (block + 1) * kBlock); ++i) {
+    for (int64_t i = block * kColorBlock; i < std::min(count, (block + 1) * kColorBlock); ++i) {
       const Vec3d& color = colors[static_cast<size_t>(i)];
       sums.log_likelihood += SharesOf(densities, color, shares.data());
       for (size_t k = 0; k < parts; ++k) sums.parts[k].Add(shares[k], color - mixture[k].mean);
@@ -99,7 +99,7 @@ void AddPrior(const GaussianMixture& prior, double count, const GaussianMixture&
 GaussianMixture Iterate(GaussianMixture mixture, const std::vector<Vec3d>& colors,
                         const GaussianMixture* prior) {
   Expectation now = Expect(mixture, colors);
-  for (int i = 0; i < kMostIterations; ++i) {
+  for (int i = 0; i < kMostMixtureIterations; ++i) {
     if (prior != nullptr)
       AddPrior(*prior, kPriorShare * static_cast<double>(colors.size()), mixture, &now.parts);
     GaussianMixture next = Maximised(mixture, now.parts);

@@ -13,7 +13,7 @@ namespace {
 using Matrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 using Vector = Eigen::VectorXd;
 
-constexpr int kMostIterations = 60;
+constexpr int kMostRegionIterations = 60;
 constexpr double kLeastGain = 1e-4;  // nats a row
 
 Eigen::Map<const Matrix> CovarianceOf(const RegionPart& part) {
@@ -122,7 +122,7 @@ RegionMixture FitRegions(const FeatureRows& rows, int parts, uint64_t seed) {
   Eigen::MatrixXd shares = FirstShares(x, parts, seed);
   RegionMixture mixture = Maximised(x, shares);
   double likelihood = Expect(mixture, x, &shares);
-  for (int i = 0; i < kMostIterations; ++i) {
+  for (int i = 0; i < kMostRegionIterations; ++i) {
     mixture = Maximised(x, shares);
     const double then = Expect(mixture, x, &shares);
     if (!(then - likelihood >= kLeastGain)) break;

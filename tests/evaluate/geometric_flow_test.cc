@@ -15,12 +15,12 @@ namespace {
 
 using namespace regrade::testing;
 
-constexpr int kW = 120, kH = 90;
+constexpr int kPlaneW = 120, kPlaneH = 90;
 
 Camera CameraAt(Vec3d center, double turn) {
   Camera camera;
-  camera.width = kW;
-  camera.height = kH;
+  camera.width = kPlaneW;
+  camera.height = kPlaneH;
   camera.fx = 110;
   camera.fy = 115;
   camera.cx = 61.3;
@@ -36,9 +36,9 @@ Camera CameraAt(Vec3d center, double turn) {
 // Distance along each pixel's ray to the plane z = 4 + 0.3 x, and to the square |x|, |y| < 0.4
 // at z = 2 in front of it if `square` is set.
 Image DepthOf(const Camera& camera, bool square) {
-  Image depth(kW, kH, 1);
-  for (int y = 0; y < kH; ++y)
-    for (int x = 0; x < kW; ++x) {
+  Image depth(kPlaneW, kPlaneH, 1);
+  for (int y = 0; y < kPlaneH; ++y)
+    for (int x = 0; x < kPlaneW; ++x) {
       const RayT<double> ray = camera.WorldRay(x + 0.5, y + 0.5);
       const Vec3d &o = ray.origin, &d = ray.direction;
       double t = (4 + 0.3 * o.x - o.z) / (d.z - 0.3 * d.x);
@@ -59,14 +59,14 @@ TEST(GeometricFlow, H124_PlaneLeavesTheInterpolationErrorOnly) {
   const auto colour = [&](double u, double v) {
     return 0.5 + 0.3 * std::sin(k1 * u + k2 * v) * std::cos(k2 * u - k1 * v);
   };
-  Image picture_a(kW, kH, 3), picture_b(kW, kH, 3);
+  Image picture_a(kPlaneW, kPlaneH, 3), picture_b(kPlaneW, kPlaneH, 3);
   double worst_flow = 0;
   PairMotion motion;
   Image visible;
   motion.flow = GeometricFlow(depth_a, a, depth_b, b, &visible);
   motion.mask = GeometricMask(motion.flow, visible);
-  for (int y = 0; y < kH; ++y)
-    for (int x = 0; x < kW; ++x) {
+  for (int y = 0; y < kPlaneH; ++y)
+    for (int x = 0; x < kPlaneW; ++x) {
       const RayT<double> ray = a.WorldRay(x + 0.5, y + 0.5);
       const double t =
           (4 + 0.3 * ray.origin.x - ray.origin.z) / (ray.direction.z - 0.3 * ray.direction.x);
@@ -106,7 +106,8 @@ TEST(GeometricFlow, H124_TheSameThroughEvaluateConsistency) {
   ConsistencyOptions options;
   options.gaps = {1};
   options.mode = "geometry";
-  const FrameSource grey = Frames({ConstantImage(kW, kH, 0.5f), ConstantImage(kW, kH, 0.6f)});
+  const FrameSource grey =
+      Frames({ConstantImage(kPlaneW, kPlaneH, 0.5f), ConstantImage(kPlaneW, kPlaneH, 0.6f)});
   const auto report = EvaluateConsistency(grey, {{"s", grey}}, options, {}, [&](int i) {
     return FrameGeometry{DepthOf(cameras[i], false), cameras[i]};
   });
@@ -122,8 +123,8 @@ TEST(GeometricFlow, HiddenPointsFailTheDepthTest) {
   // far from it nothing is hidden. The test checks with a ray of b.
   int wrong = 0, hidden = 0;
   const Image depth_a = DepthOf(a, true);
-  for (int y = 0; y < kH; ++y)
-    for (int x = 0; x < kW; ++x) {
+  for (int y = 0; y < kPlaneH; ++y)
+    for (int x = 0; x < kPlaneW; ++x) {
       const RayT<double> ray = a.WorldRay(x + 0.5, y + 0.5);
       const Vec3d p = ray.origin + ray.direction * static_cast<double>(*depth_a.at(x, y));
       const Vec3d to_b = b.Center() - p;
@@ -146,9 +147,9 @@ TEST(GeometricFlow, HiddenPointsFailTheDepthTest) {
 
 // The wall z = `z(x)` as seen by camera a.
 Image DepthOfColumns(const Camera& camera, const std::function<double(int)>& z) {
-  Image depth(kW, kH, 1);
-  for (int y = 0; y < kH; ++y)
-    for (int x = 0; x < kW; ++x)
+  Image depth(kPlaneW, kPlaneH, 1);
+  for (int y = 0; y < kPlaneH; ++y)
+    for (int x = 0; x < kPlaneW; ++x)
       *depth.at(x, y) = static_cast<float>(z(x) * Norm(camera.CameraRay(x + 0.5, y + 0.5)));
   return depth;
 }

@@ -8,21 +8,21 @@
 namespace regrade {
 namespace {
 
-constexpr int kW = 160, kH = 80;
+constexpr int kSeenW = 160, kSeenH = 80;
 constexpr double kWall = 4;
 
 // Looks along z from (x, 0, z); the picture is 4 x 2 world units at the wall.
 Camera CameraAt(double x, double z = 0) {
   Camera camera;
-  camera.width = kW, camera.height = kH;
-  camera.fx = camera.fy = kW;
-  camera.cx = kW / 2.0, camera.cy = kH / 2.0;
+  camera.width = kSeenW, camera.height = kSeenH;
+  camera.fx = camera.fy = kSeenW;
+  camera.cx = kSeenW / 2.0, camera.cy = kSeenH / 2.0;
   camera.camera_from_world.translation = {-x, 0, -z};
   return camera;
 }
 
 SampledView WallFrom(double x, const Image& kept = {}) {
-  Image depth(kW, kH, 1);
+  Image depth(kSeenW, kSeenH, 1);
   for (float& value : depth.pixels) value = kWall;
   return SampleView(CameraAt(x), depth, kept);
 }
@@ -38,27 +38,27 @@ TEST(SeenByFew, H173_ASideThatTwoPhotosSeeIsCounted) {
 
 TEST(SeenByFew, H173_WhatIsHiddenInAPhotoIsNotSeenByIt) {
   // An object before the left quarter of the third photo.
-  Image depth(kW, kH, 1);
-  for (int y = 0; y < kH; ++y)
-    for (int x = 0; x < kW; ++x) *depth.at(x, y) = x < kW / 4 ? 1 : kWall;
+  Image depth(kSeenW, kSeenH, 1);
+  for (int y = 0; y < kSeenH; ++y)
+    for (int x = 0; x < kSeenW; ++x) *depth.at(x, y) = x < kSeenW / 4 ? 1 : kWall;
   const SampledView wall = WallFrom(0), hidden = SampleView(CameraAt(0), depth);
   EXPECT_NEAR(SeenByFew(wall, {wall, wall, hidden}, 0).value(), 0.25, 1e-12);
   // Nothing is hidden where a photo shows no surface.
-  const SampledView empty = SampleView(CameraAt(0), Image(kW, kH, 1));
+  const SampledView empty = SampleView(CameraAt(0), Image(kSeenW, kSeenH, 1));
   EXPECT_EQ(SeenByFew(wall, {wall, wall, empty}, 0).value(), 0);
 }
 
 TEST(SeenByFew, H173_WhatIsMaskedInAPhotoIsNotSeenByIt) {
-  Image kept(kW, kH, 1);
-  for (int y = 0; y < kH; ++y)
-    for (int x = kW / 2; x < kW; ++x) *kept.at(x, y) = 1;
+  Image kept(kSeenW, kSeenH, 1);
+  for (int y = 0; y < kSeenH; ++y)
+    for (int x = kSeenW / 2; x < kSeenW; ++x) *kept.at(x, y) = 1;
   const SampledView wall = WallFrom(0);
   EXPECT_NEAR(SeenByFew(wall, {wall, wall, WallFrom(0, kept)}, 0).value(), 0.5, 1e-12);
 }
 
 TEST(SeenByFew, H173_BehindAPhotoOrNearerThanItsLimitIsNotSeen) {
   const SampledView wall = WallFrom(0);
-  Image any(kW, kH, 1);
+  Image any(kSeenW, kSeenH, 1);
   const SampledView beyond = SampleView(CameraAt(0, kWall + 1), any);
   EXPECT_EQ(SeenByFew(wall, {wall, wall, beyond}, 0).value(), 1);
   EXPECT_EQ(SeenByFew(wall, {wall, wall, wall}, kWall - 0.01).value(), 0);
@@ -66,7 +66,7 @@ TEST(SeenByFew, H173_BehindAPhotoOrNearerThanItsLimitIsNotSeen) {
 }
 
 TEST(SeenByFew, H173_AViewWithoutSurfacesHasNoShare) {
-  const SampledView empty = SampleView(CameraAt(0), Image(kW, kH, 1));
+  const SampledView empty = SampleView(CameraAt(0), Image(kSeenW, kSeenH, 1));
   EXPECT_FALSE(SeenByFew(empty, {WallFrom(0)}, 0).has_value());
 }
 

@@ -15,7 +15,7 @@ namespace regrade {
 namespace {
 
 // Uniform in [-1, 1).
-double Random(uint64_t stream, uint64_t counter) {
+double Between(uint64_t stream, uint64_t counter) {
   return 2 * RandomDouble(20231104, stream, counter) - 1;
 }
 
@@ -78,7 +78,7 @@ TEST(Adam, FollowsTheFormula) {
   std::vector<float> x = {1.0f};
   double value = 1, m = 0, v = 0;
   for (int t = 1; t <= 50; ++t) {
-    std::vector<float> g = {static_cast<float>(2 * x[0] + Random(40, t))};
+    std::vector<float> g = {static_cast<float>(2 * x[0] + Between(40, t))};
     const double gd = g[0];
     AdamStep({}, 0.02, {g.data(), 1}, {x.data(), 1}, &state);
     m = 0.9 * m + 0.1 * gd;

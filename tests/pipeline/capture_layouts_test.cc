@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <filesystem>
 
-#include "kernels/process/child_process.h"
 #include "pipeline/capture/capture_store.h"
 #include "pipeline/capture/transforms_json.h"
 #include "pipeline/files/json_file.h"
@@ -13,31 +12,22 @@
 #include "pipeline/images/image_file.h"
 #include "tests/support/expect_error.h"
 #include "tests/support/temporary_folder.h"
+#include "tests/support/tiny_run.h"
 
 namespace regrade {
 namespace {
 
 namespace fs = std::filesystem;
+using testing::ExitCodeOf;
 using testing::TemporaryFolder;
 using testing::WriteText;
 
 constexpr int kPhotos = 8;
 
-int Regrade(std::vector<std::string> arguments) {
-  ChildOptions options;
-  options.argv = {REGRADE_PROGRAM};
-  options.argv.insert(options.argv.end(), arguments.begin(), arguments.end());
-  options.wall_limit_s = 120;
-  const ChildResult result = RunChild(options, [](const std::string&) {});
-  return result.end == ChildEnd::kExited ? result.exit_status : -1;
-}
-
 class CaptureLayouts : public ::testing::Test {
  protected:
   void SetUp() override {
-    ASSERT_EQ(Regrade({"synth", folder_ / "s", "--views", std::to_string(kPhotos), "--size",
-                       "96x72"}),
-              0);
+    testing::WriteCapture(folder_ / "s", kPhotos, "96x72");
     const std::string truth = folder_ / "s/truth/transforms.json";
     for (const TransformsFrame& frame : ReadTransformsJson(truth).frames) {
       cameras_.push_back(frame.camera);
@@ -53,8 +43,9 @@ class CaptureLayouts : public ::testing::Test {
 
   // The poses of `capture` as regrade stores them.
   Capture Pose(const std::string& capture, const std::string& out) const {
-    EXPECT_EQ(Regrade({"pose", folder_ / capture, "--out", folder_ / out, "--tracks", "given"}),
-              0);
+    EXPECT_EQ(
+        ExitCodeOf({"pose", folder_ / capture, "--out", folder_ / out, "--tracks", "given"}),
+        0);
     return ReadCapture(folder_ / (out + "/poses"));
   }
 
@@ -144,8 +135,8 @@ TEST_F(CaptureLayouts, NsvfWithoutPrefixesHasNoSplit) {
   EXPECT_FALSE(capture.box.has_value());
   // A pose that is damaged is refused.
   WriteText(folder_ / "n/poses/a0.txt", "1 0 0 0\n0 1 0 0\n");
-  EXPECT_EQ(Regrade({"pose", folder_ / "n", "--out", folder_ / "other", "--tracks", "given"}),
-            3);
+  EXPECT_EQ(
+      ExitCodeOf({"pose", folder_ / "n", "--out", folder_ / "other", "--tracks", "given"}), 3);
 }
 
 TEST_F(CaptureLayouts, DtusNumberedCameras) {
@@ -237,10 +228,12 @@ TEST_F(CaptureLayouts, NerfstudiosMasksAndTestPhotos) {
   EXPECT_EQ(ReadImage(folder_ / "out/poses/masks/00005.png.png").pixels, mask.pixels);
   EXPECT_FALSE(fs::exists(folder_ / "out/poses/masks/00004.png.png"));
   // Another mask is another input.
-  EXPECT_EQ(Regrade({"pose", folder_ / "f", "--out", folder_ / "out", "--tracks", "given"}), 0);
+  EXPECT_EQ(ExitCodeOf({"pose", folder_ / "f", "--out", folder_ / "out", "--tracks", "given"}),
+            0);
   mask.pixels[96 * 20] = 1;
   WritePng8(folder_ / "f/masks/m5.png", mask);
-  EXPECT_EQ(Regrade({"pose", folder_ / "f", "--out", folder_ / "out", "--tracks", "given"}), 3);
+  EXPECT_EQ(ExitCodeOf({"pose", folder_ / "f", "--out", folder_ / "out", "--tracks", "given"}),
+            3);
 }
 
 TEST_F(CaptureLayouts, PolycamsCameras) {
@@ -272,24 +265,24 @@ TEST_F(CaptureLayouts, PolycamsCameras) {
     EXPECT_NEAR(found.fy, truth.fy, 1e-9);
   }
   WriteText(folder_ / "p/keyframes/corrected_cameras/170000.json", "{\"fx\": 1}");
-  EXPECT_EQ(Regrade({"pose", folder_ / "p", "--out", folder_ / "other", "--tracks", "given"}),
-            3);
+  EXPECT_EQ(
+      ExitCodeOf({"pose", folder_ / "p", "--out", folder_ / "other", "--tracks", "given"}), 3);
 }
 
 // The output folder may be inside the folder of photos: the same command goes on.
 TEST_F(CaptureLayouts, ResultsInsideThePhotosAreNoPhotos) {
   const std::vector<std::string> pose{
       "pose", folder_ / "all", "--out", folder_ / "all/images/out", "--tracks", "given"};
-  ASSERT_EQ(
-      Regrade({"pose", folder_ / "s/truth", "--out", folder_ / "first", "--tracks", "given"}),
-      0);
-  ASSERT_EQ(Regrade({"export", folder_ / "first", "--out", folder_ / "all"}), 0);
+  ASSERT_EQ(ExitCodeOf(
+                {"pose", folder_ / "s/truth", "--out", folder_ / "first", "--tracks", "given"}),
+            0);
+  ASSERT_EQ(ExitCodeOf({"export", folder_ / "first", "--out", folder_ / "all"}), 0);
   for (int i = 0; i < 2; ++i) {
-    ASSERT_EQ(Regrade(pose), 0) << i;
+    ASSERT_EQ(ExitCodeOf(pose), 0) << i;
     EXPECT_EQ(ReadCapture(folder_ / "all/images/out/poses").statuses.size(), 8u) << i;
   }
   // But it is not the folder of photos itself.
-  EXPECT_EQ(Regrade({"pose", folder_ / "all", "--out", folder_ / "all/."}), 2);
+  EXPECT_EQ(ExitCodeOf({"pose", folder_ / "all", "--out", folder_ / "all/."}), 2);
   EXPECT_FALSE(fs::exists(folder_ / "all/.regrade"));
 }
 

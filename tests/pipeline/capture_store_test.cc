@@ -7,31 +7,24 @@
 #include <fstream>
 
 #include "kernels/image/resize.h"
-#include "kernels/process/child_process.h"
 #include "pipeline/files/json_file.h"
 #include "pipeline/images/image_file.h"
 #include "tests/support/expect_error.h"
 #include "tests/support/temporary_folder.h"
+#include "tests/support/tiny_run.h"
 
 namespace regrade {
 namespace {
 
+using testing::ExitCodeOf;
 using testing::TemporaryFolder;
-
-int Regrade(std::vector<std::string> arguments) {
-  ChildOptions options;
-  options.argv = {REGRADE_PROGRAM};
-  options.argv.insert(options.argv.end(), arguments.begin(), arguments.end());
-  options.wall_limit_s = 120;
-  const ChildResult result = RunChild(options, [](const std::string&) {});
-  return result.end == ChildEnd::kExited ? result.exit_status : -1;
-}
 
 TEST(CaptureStore, AnOutputFolderIsACaptureWithItsPoses) {
   const TemporaryFolder folder;
-  ASSERT_EQ(Regrade({"synth", folder / "s", "--views", "6", "--size", "96x72"}), 0);
+  testing::WriteCapture(folder / "s", 6, "96x72");
   ASSERT_EQ(
-      Regrade({"pose", folder / "s/truth", "--out", folder / "first", "--tracks", "given"}), 0);
+      ExitCodeOf({"pose", folder / "s/truth", "--out", folder / "first", "--tracks", "given"}),
+      0);
   EXPECT_EQ(DetectCapture(folder / "s/truth").kind, CaptureKind::kTransforms);
   for (const char* name : {"first", "first/poses"}) {
     const CaptureSource source = DetectCapture(folder / name);
@@ -39,7 +32,8 @@ TEST(CaptureStore, AnOutputFolderIsACaptureWithItsPoses) {
     EXPECT_EQ(std::filesystem::path(source.photos).filename(), "photos");
   }
   ASSERT_EQ(
-      Regrade({"pose", folder / "first", "--out", folder / "second", "--tracks", "given"}), 0);
+      ExitCodeOf({"pose", folder / "first", "--out", folder / "second", "--tracks", "given"}),
+      0);
   const Capture before = ReadCapture(folder / "first/poses"),
                 after = ReadCapture(folder / "second/poses");
   ASSERT_EQ(after.views.size(), 6u);
@@ -47,34 +41,39 @@ TEST(CaptureStore, AnOutputFolderIsACaptureWithItsPoses) {
     EXPECT_LE(Norm(before.views[i].camera.Center() - after.views[i].camera.Center()), 1e-12)
         << "a quaternion's rounding";
   // Into itself it would be written over.
-  EXPECT_EQ(Regrade({"pose", folder / "first", "--out", folder / "first"}), 2);
-  EXPECT_EQ(Regrade({"pose", folder / "first/poses", "--out", folder / "first"}), 2);
+  EXPECT_EQ(ExitCodeOf({"pose", folder / "first", "--out", folder / "first"}), 2);
+  EXPECT_EQ(ExitCodeOf({"pose", folder / "first/poses", "--out", folder / "first"}), 2);
   EXPECT_EQ(ReadCapture(folder / "first/poses").views.size(), 6u);
 }
 
 // What photos.json alone knows of a capture decides about its field's box: it is an input.
 TEST(CaptureStore, ANearestDepthThatChangedIsAnotherCapture) {
   const TemporaryFolder folder;
-  ASSERT_EQ(Regrade({"synth", folder / "s", "--views", "6", "--size", "96x72"}), 0);
+  testing::WriteCapture(folder / "s", 6, "96x72");
   ASSERT_EQ(
-      Regrade({"pose", folder / "s/truth", "--out", folder / "first", "--tracks", "given"}), 0);
+      ExitCodeOf({"pose", folder / "s/truth", "--out", folder / "first", "--tracks", "given"}),
+      0);
   ASSERT_EQ(
-      Regrade({"pose", folder / "first", "--out", folder / "second", "--tracks", "given"}), 0);
+      ExitCodeOf({"pose", folder / "first", "--out", folder / "second", "--tracks", "given"}),
+      0);
   ASSERT_EQ(
-      Regrade({"pose", folder / "first", "--out", folder / "second", "--tracks", "given"}), 0);
+      ExitCodeOf({"pose", folder / "first", "--out", folder / "second", "--tracks", "given"}),
+      0);
   const std::string index = folder / "first/poses/photos.json";
   JsonValue json = ReadJsonFile(index);
   json["nearest_depth"] = 0.5;
   WriteJsonFile(index, json);
   EXPECT_EQ(
-      Regrade({"pose", folder / "first", "--out", folder / "second", "--tracks", "given"}), 3);
+      ExitCodeOf({"pose", folder / "first", "--out", folder / "second", "--tracks", "given"}),
+      3);
 }
 
 TEST(CaptureStore, AFolderOfAnotherSchemaIsRefused) {
   const TemporaryFolder folder;
-  ASSERT_EQ(Regrade({"synth", folder / "s", "--views", "6", "--size", "96x72"}), 0);
+  testing::WriteCapture(folder / "s", 6, "96x72");
   ASSERT_EQ(
-      Regrade({"pose", folder / "s/truth", "--out", folder / "first", "--tracks", "given"}), 0);
+      ExitCodeOf({"pose", folder / "s/truth", "--out", folder / "first", "--tracks", "given"}),
+      0);
   const std::string index = folder / "first/poses/photos.json";
   JsonValue json = ReadJsonFile(index);
   json["schema"] = 1;
@@ -83,7 +82,7 @@ TEST(CaptureStore, AFolderOfAnotherSchemaIsRefused) {
                        "is of schema 1, this version of regrade reads schema 2");
   EXPECT_REGRADE_ERROR(ReadCapture(folder / "first/poses"), ExitCode::kInput,
                        "--restart-from pose");
-  EXPECT_EQ(Regrade({"pose", folder / "first", "--out", folder / "second"}), 3);
+  EXPECT_EQ(ExitCodeOf({"pose", folder / "first", "--out", folder / "second"}), 3);
 }
 
 TEST(PhotoStatuses, LaterOnesDecide) {
@@ -108,9 +107,9 @@ TEST(PhotoStatuses, LaterOnesDecide) {
 // Refinement needs tracks: an error where it was requested.
 TEST(CaptureStore, PosesWithoutTracksCannotBeRefined) {
   const TemporaryFolder folder;
-  ASSERT_EQ(Regrade({"synth", folder / "s", "--views", "6", "--size", "96x72"}), 0);
-  EXPECT_EQ(Regrade({"pose", folder / "s/truth", "--out", folder / "out", "--effects",
-                     "pose-refinement=on", "--tracks", "given"}),
+  testing::WriteCapture(folder / "s", 6, "96x72");
+  EXPECT_EQ(ExitCodeOf({"pose", folder / "s/truth", "--out", folder / "out", "--effects",
+                        "pose-refinement=on", "--tracks", "given"}),
             6);
 }
 
@@ -118,13 +117,15 @@ TEST(CaptureStore, PosesWithoutTracksCannotBeRefined) {
 // the missing ones have in the model: no photo may get another's pose.
 TEST(CaptureStore, F61_PosesOfMissingPicturesAreUnused) {
   const TemporaryFolder folder;
-  ASSERT_EQ(Regrade({"synth", folder / "s", "--views", "6", "--size", "96x72"}), 0);
-  ASSERT_EQ(Regrade({"pose", folder / "s/truth", "--out", folder / "all", "--tracks", "given"}),
-            0);
-  ASSERT_EQ(Regrade({"export", folder / "all", "--out", folder / "w"}), 0);
+  testing::WriteCapture(folder / "s", 6, "96x72");
+  ASSERT_EQ(
+      ExitCodeOf({"pose", folder / "s/truth", "--out", folder / "all", "--tracks", "given"}),
+      0);
+  ASSERT_EQ(ExitCodeOf({"export", folder / "all", "--out", folder / "w"}), 0);
   for (const char* name : {"00000.png", "00003.png"})
     std::filesystem::remove(folder / (std::string("w/images/") + name));
-  ASSERT_EQ(Regrade({"pose", folder / "w", "--out", folder / "some", "--tracks", "given"}), 0);
+  ASSERT_EQ(ExitCodeOf({"pose", folder / "w", "--out", folder / "some", "--tracks", "given"}),
+            0);
   const Capture all = ReadCapture(folder / "all/poses"),
                 some = ReadCapture(folder / "some/poses");
   ASSERT_EQ(some.views.size(), 4u);
@@ -138,16 +139,16 @@ TEST(CaptureStore, F61_PosesOfMissingPicturesAreUnused) {
   EXPECT_EQ(some.statuses[4].file, "00000.png");
   EXPECT_EQ(some.statuses[4].status, PhotoState::kSkipped);
   // And so as a capture of its own.
-  EXPECT_EQ(Regrade({"pose", folder / "some", "--out", folder / "again", "--tracks", "given"}),
-            0);
+  EXPECT_EQ(
+      ExitCodeOf({"pose", folder / "some", "--out", folder / "again", "--tracks", "given"}), 0);
   EXPECT_EQ(ReadCapture(folder / "again/poses").views.size(), 4u);
 }
 
 // Pictures that were made smaller after their poses were found, in a folder of another name.
 TEST(CaptureStore, H137_CamerasFollowPicturesThatWereResampled) {
   const TemporaryFolder folder;
-  ASSERT_EQ(Regrade({"synth", folder / "s", "--views", "6", "--size", "200x150", "--effects",
-                     "poses"}),
+  ASSERT_EQ(ExitCodeOf({"synth", folder / "s", "--views", "6", "--size", "200x150", "--effects",
+                        "poses"}),
             0);
   std::filesystem::rename(folder / "s/images", folder / "s/images_4");
   std::filesystem::create_directories(folder / "s/images_8");  // not this one
@@ -156,8 +157,8 @@ TEST(CaptureStore, H137_CamerasFollowPicturesThatWereResampled) {
     WritePng8(path, Resize(ReadImage(path), 133, 100));
   }
   EXPECT_EQ(DetectCapture(folder / "s").kind, CaptureKind::kColmap);
-  ASSERT_EQ(Regrade({"pose", folder / "s", "--out", folder / "out", "--effects",
-                     "pose-refinement=off"}),
+  ASSERT_EQ(ExitCodeOf({"pose", folder / "s", "--out", folder / "out", "--effects",
+                        "pose-refinement=off"}),
             0);
   const Capture capture = ReadCapture(folder / "out/poses");
   ASSERT_EQ(capture.views.size(), 6u);
@@ -171,7 +172,7 @@ TEST(CaptureStore, H137_CamerasFollowPicturesThatWereResampled) {
     const std::string path = folder / ("s/images_4/0000" + std::to_string(i) + ".png");
     WritePng8(path, Resize(ReadImage(path), 200, 180));
   }
-  EXPECT_EQ(Regrade({"pose", folder / "s", "--out", folder / "other"}), 3);
+  EXPECT_EQ(ExitCodeOf({"pose", folder / "s", "--out", folder / "other"}), 3);
 }
 
 // LLFF's file beside pictures of one size only, or among them.
@@ -190,10 +191,11 @@ TEST(CaptureStore, PicturesOfAnLlffFile) {
 // A list of poses that names pictures which are not there.
 TEST(CaptureStore, MissingPicturesOfATransformsFileAreReported) {
   const TemporaryFolder folder;
-  ASSERT_EQ(Regrade({"synth", folder / "s", "--views", "6", "--size", "96x72"}), 0);
+  testing::WriteCapture(folder / "s", 6, "96x72");
   std::filesystem::remove(folder / "s/images/00002.png");
-  ASSERT_EQ(Regrade({"pose", folder / "s/truth", "--out", folder / "out", "--tracks", "given"}),
-            0);
+  ASSERT_EQ(
+      ExitCodeOf({"pose", folder / "s/truth", "--out", folder / "out", "--tracks", "given"}),
+      0);
   const Capture capture = ReadCapture(folder / "out/poses");
   EXPECT_EQ(capture.views.size(), 5u);
   ASSERT_EQ(capture.statuses.size(), 6u);

@@ -26,9 +26,7 @@ constexpr char kFirstPhoto[] = "/images/00000.png";
 // A capture with given poses whose photos are replaced.
 class ColorCopies : public testing::PictureTest {
  protected:
-  void SetUp() override {
-    ASSERT_EQ(Regrade({"synth", scratch_ / "srgb", "--views", "16", "--size", "128x96"}), 0);
-  }
+  void SetUp() override { testing::WriteCapture(scratch_ / "srgb", 16, "128x96"); }
   static int Regrade(const std::vector<std::string>& arguments) {
     const testing::ProgramOutcome done = testing::RunProgram(REGRADE_PROGRAM, arguments);
     if (done.code != 0) std::printf("%s\n", done.text.c_str());

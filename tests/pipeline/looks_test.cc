@@ -18,12 +18,9 @@ namespace {
 
 using testing::ProgramOutcome;
 using testing::ReadText;
+using testing::Regrade;
 using testing::TemporaryFolder;
 using testing::WriteText;
-
-ProgramOutcome Regrade(const std::vector<std::string>& arguments) {
-  return testing::RunProgram(REGRADE_PROGRAM, arguments);
-}
 
 Vec3d Look(const Vec3d& c) {
   return {0.1 + 0.8 * c.x * c.x, 0.9 * c.y, 0.2 + 0.3 * c.z + 0.3 * c.x};
@@ -31,7 +28,7 @@ Vec3d Look(const Vec3d& c) {
 
 TEST(Looks, ALutIsAStyleAndAStyleALut) {
   const TemporaryFolder folder;
-  ASSERT_EQ(Regrade({"synth", folder / "s", "--views", "6", "--size", "96x72"}).code, 0);
+  testing::WriteCapture(folder / "s", 6, "96x72");
   WriteText(folder / "warm.cube", CubeText(TabulateColors(17, Look), "warm"));
   std::vector<std::string> run{"run",     folder / "s/truth",   "--out",    folder / "out",
                                "--style", folder / "warm.cube", "--device", "cpu"};

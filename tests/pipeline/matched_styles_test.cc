@@ -20,11 +20,8 @@ namespace {
 namespace fs = std::filesystem;
 using testing::ProgramOutcome;
 using testing::ReadText;
+using testing::Regrade;
 using testing::TemporaryFolder;
-
-ProgramOutcome Regrade(const std::vector<std::string>& arguments) {
-  return testing::RunProgram(REGRADE_PROGRAM, arguments);
-}
 
 // The mean over the pixels where `mask` is 1, or all.
 Vec3d MeanColor(const Image& image, const Image* mask) {
@@ -41,7 +38,7 @@ Vec3d MeanColor(const Image& image, const Image* mask) {
 
 TEST(MatchedStyles, EachRegionTakesItsPictureAndTheStyleIsLikeAnyOther) {
   const TemporaryFolder folder;
-  ASSERT_EQ(Regrade({"synth", folder / "s", "--views", "6", "--size", "96x72"}).code, 0);
+  testing::WriteCapture(folder / "s", 6, "96x72");
   const testing::TwoRegions scene = testing::SkyAndGround(6, 96, 72);
   for (int i = 0; i < 6; ++i)
     WritePng8(folder / Format("s/images/%05d.png", i), scene.photos[static_cast<size_t>(i)]);

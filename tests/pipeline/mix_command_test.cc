@@ -20,6 +20,7 @@ namespace regrade {
 namespace {
 
 using testing::ProgramOutcome;
+using testing::Regrade;
 using testing::TemporaryFolder;
 
 std::string Bytes(const std::string& path) {
@@ -27,15 +28,11 @@ std::string Bytes(const std::string& path) {
   return {std::istreambuf_iterator<char>(file), {}};
 }
 
-ProgramOutcome Regrade(const std::vector<std::string>& arguments) {
-  return testing::RunProgram(REGRADE_PROGRAM, arguments);
-}
-
 // A scene whose colours know no direction has a style that does, and a film between the two.
 TEST(MixCommand, AStyleMayKnowDirectionsThatItsSceneDoesNot) {
   const TemporaryFolder folder;
   const std::string style = testing::SourceDir() + "/assets/style_sunset.png";
-  ASSERT_EQ(Regrade({"synth", folder / "s", "--views", "6", "--size", "96x72"}).code, 0);
+  testing::WriteCapture(folder / "s", 6, "96x72");
   std::vector<std::string> run{"run", folder / "s/truth", "--style", style, "--out",
                                folder / "e", "--effects", "view-dependence=off",
                                // 30 steps of an adaptive field leave too little to learn from.
@@ -65,7 +62,7 @@ TEST(MixCommand, AStyleMayKnowDirectionsThatItsSceneDoesNot) {
 TEST(MixCommand, H49_AFilmBetweenTheSceneAndItsStyle) {
   const TemporaryFolder folder;
   const std::string style = testing::SourceDir() + "/assets/style_sunset.png";
-  ASSERT_EQ(Regrade({"synth", folder / "s", "--views", "6", "--size", "96x72"}).code, 0);
+  testing::WriteCapture(folder / "s", 6, "96x72");
   std::vector<std::string> run{"run",   folder / "s/truth", "--style",     style,
                                "--out", folder / "e",       "--keep-field"};
   for (const std::string& flag : testing::TinyFlags()) run.push_back(flag);

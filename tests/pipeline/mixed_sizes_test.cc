@@ -24,13 +24,10 @@ namespace {
 
 namespace fs = std::filesystem;
 using testing::ProgramOutcome;
+using testing::Regrade;
 using testing::TemporaryFolder;
 
 const std::string kStyle = testing::SourceDir() + "/assets/style_sunset.png";
-
-ProgramOutcome Regrade(const std::vector<std::string>& arguments) {
-  return testing::RunProgram(REGRADE_PROGRAM, arguments);
-}
 
 std::vector<std::string> RunOf(const std::string& capture, const std::string& out,
                                const std::vector<std::string>& more = {}) {
@@ -171,7 +168,7 @@ TEST(MixedSizes, H159_ThreeSizesOfTwoCamerasGoToFilmAndReport) {
 
 TEST(MixedSizes, H159_OnePhotoOfAnotherShape) {
   const TemporaryFolder folder;
-  ASSERT_EQ(Regrade({"synth", folder / "s", "--views", "5", "--size", "128x96"}).code, 0);
+  testing::WriteCapture(folder / "s", 5, "128x96");
   CropPhoto(folder / "s", 0, 72, 96);  // the first photo does not determine the common camera
   const ProgramOutcome done = Regrade(RunOf(folder / "s/truth", folder / "e"));
   ASSERT_EQ(done.code, 0) << done.text;
@@ -183,7 +180,7 @@ TEST(MixedSizes, H159_OnePhotoOfAnotherShape) {
 
 TEST(MixedSizes, H159_OneOfEachAndAPanorama) {
   const TemporaryFolder folder;
-  ASSERT_EQ(Regrade({"synth", folder / "s", "--views", "4", "--size", "384x96"}).code, 0);
+  testing::WriteCapture(folder / "s", 4, "384x96");
   CropPhoto(folder / "s", 0, 128, 96);
   CropPhoto(folder / "s", 1, 96, 96);
   CropPhoto(folder / "s", 2, 72, 96);
@@ -198,7 +195,7 @@ TEST(MixedSizes, H159_OneOfEachAndAPanorama) {
 // Frames too small for flow have no consistency, and the report says why.
 TEST(MixedSizes, H159_FramesBelowTheFlowsPyramidHaveAReason) {
   const TemporaryFolder folder;
-  ASSERT_EQ(Regrade({"synth", folder / "s", "--views", "4", "--size", "512x64"}).code, 0);
+  testing::WriteCapture(folder / "s", 4, "512x64");
   const ProgramOutcome done =
       Regrade(RunOf(folder / "s/truth", folder / "e", {"--pose-min-photos", "4"}));
   ASSERT_EQ(done.code, 0) << done.text;

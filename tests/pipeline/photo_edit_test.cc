@@ -25,7 +25,7 @@ struct Pair {
   SyntheticView view;
 };
 
-const Pair& Table() {
+const Pair& TableScene() {
   static const Pair pair = [] {
     Pair p;
     p.scene = MakeSyntheticScene("table", 0);
@@ -37,8 +37,9 @@ const Pair& Table() {
 }
 
 Image Graded(SynthGrade grade) {
-  Image color = Table().view.color;
-  ApplyGrade(grade, Table().scene, Table().camera, Table().view.depth, 1, &color);
+  Image color = TableScene().view.color;
+  ApplyGrade(grade, TableScene().scene, TableScene().camera, TableScene().view.depth, 1,
+             &color);
   return color;
 }
 
@@ -56,7 +57,7 @@ std::string Said(const PhotoEdit& edit) {
 }
 
 TEST(PhotoEdit, AGlobalGradeIsOneMapOfColours) {
-  const Image& photo = Table().view.color;
+  const Image& photo = TableScene().view.color;
   const PhotoEdit edit = AnalyseEdit(photo, Graded(SynthGrade::kGlobal));
   EXPECT_FALSE(edit.IsLocal()) << edit.local;
   EXPECT_EQ(edit.vignette(1), 1);
@@ -75,7 +76,7 @@ TEST(PhotoEdit, AGlobalGradeIsOneMapOfColours) {
 
 TEST(PhotoEdit, ALocalGradeIsKeptInThePicture) {
   const Image edited = Graded(SynthGrade::kLocal);
-  const PhotoEdit edit = AnalyseEdit(Table().view.color, edited);
+  const PhotoEdit edit = AnalyseEdit(TableScene().view.color, edited);
   EXPECT_TRUE(edit.IsLocal()) << edit.local;
   EXPECT_EQ(edit.vignette(1), 1);
   EXPECT_NE(Said(edit).find("depends on the place"), std::string::npos);
@@ -84,7 +85,7 @@ TEST(PhotoEdit, ALocalGradeIsKeptInThePicture) {
 }
 
 TEST(PhotoEdit, H186_AVignetteIsLeftOutAndSaid) {
-  const PhotoEdit edit = AnalyseEdit(Table().view.color, Graded(SynthGrade::kVignette));
+  const PhotoEdit edit = AnalyseEdit(TableScene().view.color, Graded(SynthGrade::kVignette));
   EXPECT_NEAR(edit.vignette(1), VignetteFactor(1), 0.03);
   EXPECT_NE(Said(edit).find("a vignette (-3"), std::string::npos) << Said(edit);
   EXPECT_FALSE(edit.IsLocal()) << edit.local;
@@ -94,7 +95,7 @@ TEST(PhotoEdit, H186_AVignetteIsLeftOutAndSaid) {
 }
 
 TEST(PhotoEdit, H186_ADodgedCentreIsNoVignette) {
-  Image edited = Table().view.color;
+  Image edited = TableScene().view.color;
   for (int y = 0; y < edited.height; ++y)
     for (int x = 0; x < edited.width; ++x) {
       const double r = std::hypot(x - 160.0, y - 120.0) / 60;
@@ -102,13 +103,13 @@ TEST(PhotoEdit, H186_ADodgedCentreIsNoVignette) {
         edited.at(x, y)[c] =
             std::min(1.0f, edited.at(x, y)[c] * static_cast<float>(1 + 0.3 * std::exp(-r * r)));
     }
-  const PhotoEdit edit = AnalyseEdit(Table().view.color, edited);
+  const PhotoEdit edit = AnalyseEdit(TableScene().view.color, edited);
   EXPECT_EQ(edit.vignette(1), 1) << Said(edit);
   EXPECT_TRUE(edit.IsLocal()) << edit.local;
 }
 
 TEST(PhotoEdit, H187_SharpeningAndGrainAreLeftOutAndSaid) {
-  const Image& photo = Table().view.color;
+  const Image& photo = TableScene().view.color;
   const Image soft = Resize(Resize(photo, 160, 120), 320, 240);
   Image sharp = photo, grainy = photo;
   for (size_t i = 0; i < sharp.pixels.size(); ++i) {
@@ -128,7 +129,7 @@ TEST(PhotoEdit, H187_SharpeningAndGrainAreLeftOutAndSaid) {
 }
 
 TEST(PhotoEdit, H188_OtherSizesAreScaledAndOtherFramesRefused) {
-  const Image& photo = Table().view.color;
+  const Image& photo = TableScene().view.color;
   const Image graded = Graded(SynthGrade::kGlobal);
   EXPECT_TRUE(EditAtPhotoSize(Resize(graded, 480, 360), photo, "e").SameSize(photo));
   EXPECT_TRUE(EditAtPhotoSize(Resize(graded, 200, 150), photo, "e").SameSize(photo));

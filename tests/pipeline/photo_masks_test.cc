@@ -21,10 +21,10 @@ namespace {
 namespace fs = std::filesystem;
 using testing::TemporaryFolder;
 
-constexpr int kViews = 17, kWidth = 160, kHeight = 120, kThing = 60;
+constexpr int kMaskedViews = 17, kWidth = 160, kHeight = 120, kThing = 60;
 
 // Its output; it has to end with `exit_code`.
-std::string Regrade(std::vector<std::string> arguments, int exit_code = 0) {
+std::string Said(std::vector<std::string> arguments, int exit_code = 0) {
   ChildOptions options;
   options.argv = {REGRADE_PROGRAM};
   options.argv.insert(options.argv.end(), arguments.begin(), arguments.end());
@@ -39,10 +39,11 @@ std::string Regrade(std::vector<std::string> arguments, int exit_code = 0) {
 // A synthetic capture with its poses; in a copy of it a magenta square stands before all photos
 // but the last, somewhere else in each, and masks have it.
 void SynthWithAThing(const TemporaryFolder& folder) {
-  Regrade({"synth", folder / "clean", "--views", std::to_string(kViews), "--size", "160x120"});
+  Said({"synth", folder / "clean", "--views", std::to_string(kMaskedViews), "--size",
+        "160x120"});
   fs::copy(folder / "clean", folder / "s", fs::copy_options::recursive);
   fs::create_directories(folder / "masks");
-  for (int i = 0; i + 1 < kViews; ++i) {
+  for (int i = 0; i + 1 < kMaskedViews; ++i) {
     const std::string name = FrameName(i);
     Image photo = ReadImage(folder / ("s/images/" + name)), mask(kWidth, kHeight, 1);
     for (float& value : mask.pixels) value = 1;
@@ -65,7 +66,7 @@ void Reconstruct(const std::string& capture, const std::string& out, const std::
                                     "--fit-resolutions", "24,48", "--fit-steps", steps,
                                     "--fit-rays",        "2048"};
   words.insert(words.end(), more.begin(), more.end());
-  Regrade(words);
+  Said(words);
 }
 
 double HeldOutPsnr(const std::string& out) {
@@ -94,8 +95,8 @@ TEST(PhotoMasks, MaskedPixelsAreNeitherFittedNorMeasured) {
 
   // Nor do 2D methods see it, which map a view by its own colours.
   for (const char* out : {"with", "clean_out"})
-    Regrade({"stylize", folder / out, "--style", folder / "clean/images/00008.png",
-             "--style-steps", "1", "--path", "views"});
+    Said({"stylize", folder / out, "--style", folder / "clean/images/00008.png",
+          "--style-steps", "1", "--path", "views"});
   const Capture capture = ReadCapture(folder / "with/poses");
   for (const int i : {1, 6}) {
     const Image seen = ReadImage(folder / ("with/styles/00008/views_2d/" + FrameName(i)));
@@ -139,8 +140,8 @@ TEST(PhotoMasks, LaterStagesAndRunsUseTheStagedMasks) {
     }
     const std::string out = folder / ("out" + std::to_string(k));
     fs::copy(folder / "out", out, fs::copy_options::recursive);
-    Regrade({"stylize", out, "--style", folder / "s/images/00016.png", "--method",
-             "folder:" + styled, "--style-steps", "4", "--path", "views"});
+    Said({"stylize", out, "--style", folder / "s/images/00016.png", "--method",
+          "folder:" + styled, "--style-steps", "4", "--path", "views"});
     networks[k] = Bytes(out + "/styles/00016/network.npz");
     psnr[k] = ReadJsonFile(out + "/styles/00016/report.json")
                   .At("stages")
@@ -152,7 +153,7 @@ TEST(PhotoMasks, LaterStagesAndRunsUseTheStagedMasks) {
   EXPECT_TRUE(networks[0] == networks[1]);
   EXPECT_EQ(psnr[0], psnr[1]);
   // A run that starts from these poses has their masks.
-  Regrade({"pose", folder / "out", "--out", folder / "again", "--tracks", "given"});
+  Said({"pose", folder / "out", "--out", folder / "again", "--tracks", "given"});
   EXPECT_FALSE(ReadWorkingViews(folder / "again/poses", kWidth, 0).Mask(1).empty());
 }
 
@@ -160,9 +161,9 @@ TEST(PhotoMasks, AnEntirelyBlackMaskIsRefused) {
   const TemporaryFolder folder;
   SynthWithAThing(folder);
   WritePng8(folder / "masks/00003.png", Image(kWidth, kHeight, 1));
-  const std::string output = Regrade({"pose", folder / "s/truth", "--out", folder / "out",
-                                      "--tracks", "given", "--photo-masks", folder / "masks"},
-                                     3);
+  const std::string output = Said({"pose", folder / "s/truth", "--out", folder / "out",
+                                   "--tracks", "given", "--photo-masks", folder / "masks"},
+                                  3);
   EXPECT_NE(output.find("00003.png"), std::string::npos) << output;
 }
 

@@ -10,7 +10,7 @@
 namespace regrade {
 namespace {
 
-size_t Count(const std::string& text, const std::string& what) {
+size_t HowMany(const std::string& text, const std::string& what) {
   size_t count = 0;
   for (size_t at = text.find(what); at != std::string::npos; at = text.find(what, at + 1))
     ++count;
@@ -27,7 +27,7 @@ TEST(ReportPlot, ALineLiesWhereItsNumbersAre) {
   // Linear axes span whole steps: x as given, y from 0 to 10.
   const std::string html = PlotHtml(PlotOf({{0, 0.0, ""}, {100, 10.0, ""}}));
   EXPECT_NE(html.find("points=\"40.0,212.0 548.0,24.0 \""), std::string::npos) << html;
-  EXPECT_EQ(Count(html, "<text"), 6u + 6u + 2u);  // ticks and names of both axes
+  EXPECT_EQ(HowMany(html, "<text"), 6u + 6u + 2u);  // ticks and names of both axes
 }
 
 TEST(ReportPlot, PointsOfALineShowTheirNumbersUnderThePointer) {
@@ -41,7 +41,7 @@ TEST(ReportPlot, LogarithmicAxesHavePowersForTicks) {
   const std::string html = PlotHtml(plot);
   for (const char* tick : {">1<", ">2<", ">4<", ">8<"})
     EXPECT_NE(html.find(tick), std::string::npos) << tick;
-  EXPECT_EQ(Count(html, "<polyline"), 2u);  // a negative value breaks the line
+  EXPECT_EQ(HowMany(html, "<polyline"), 2u);  // a negative value breaks the line
 }
 
 TEST(ReportPlot, WhatCannotBeDrawnIsLeftOut) {
@@ -52,15 +52,15 @@ TEST(ReportPlot, WhatCannotBeDrawnIsLeftOut) {
   const std::string html =
       PlotHtml(PlotOf({{0, 1.0, ""}, {nan, 2.0, ""}, {2, nan, ""}, {3, 1.0, ""}}));
   EXPECT_EQ(html.find("nan"), std::string::npos) << html;
-  EXPECT_EQ(Count(html, "<polyline"), 2u);
+  EXPECT_EQ(HowMany(html, "<polyline"), 2u);
 }
 
 TEST(ReportPlot, DotsCarryTheirLabels) {
   Plot plot = PlotOf({{1, 2.0, "<b>--fit-steps 300</b>"}, {2, 3.0, "plain"}});
   plot.series[0].dots = true;
   const std::string html = PlotHtml(plot);
-  EXPECT_EQ(Count(html, "<circle"), 2u);
-  EXPECT_EQ(Count(html, "<b>"), 0u);
+  EXPECT_EQ(HowMany(html, "<circle"), 2u);
+  EXPECT_EQ(HowMany(html, "<b>"), 0u);
   EXPECT_NE(html.find("<title>&lt;b&gt;--fit-steps 300"), std::string::npos);
 }
 
@@ -100,14 +100,14 @@ TEST(CameraMap, CamerasWithoutACommonUpVectorHaveAMap) {
       Mat3d{{Vec3d{1, 0, 0}, {0, -1, 0}, {0, 0, -1}}};
   const std::string html = CameraMapHtml(MapCameras(capture, 0));
   EXPECT_EQ(html.find("nan"), std::string::npos);
-  EXPECT_EQ(Count(html, "<circle"), 2u);
+  EXPECT_EQ(HowMany(html, "<circle"), 2u);
 }
 
 TEST(CameraMap, OneCameraAndNone) {
   Capture capture = Row();
   capture.views.resize(1);
   capture.points.clear();
-  EXPECT_EQ(Count(CameraMapHtml(MapCameras(capture, 8)), "<circle"), 1u);
+  EXPECT_EQ(HowMany(CameraMapHtml(MapCameras(capture, 8)), "<circle"), 1u);
   EXPECT_EQ(CameraMapHtml(MapCameras(Capture(), 8)), "");
 }
 

@@ -33,11 +33,8 @@ using testing::EditErrors;
 using testing::EditTruth;
 using testing::ProgramOutcome;
 using testing::ReadText;
+using testing::Regrade;
 using testing::TemporaryFolder;
-
-ProgramOutcome Regrade(const std::vector<std::string>& arguments) {
-  return testing::RunProgram(REGRADE_PROGRAM, arguments);
-}
 
 constexpr int kViews = 16, kEdited = 6;
 
@@ -333,7 +330,7 @@ TEST(Retouch, ALocalEditIsLearnedFromItsPhotoAlone) {
 
 TEST(Retouch, ARenderIsWrittenToBeEdited) {
   const TemporaryFolder folder;
-  ASSERT_EQ(Regrade({"synth", folder / "s", "--views", "5", "--size", "96x72"}).code, 0);
+  testing::WriteCapture(folder / "s", 5, "96x72");
   std::vector<std::string> reconstruct{"reconstruct",  folder / "s/truth", "--out",
                                        folder / "out", "--device",         "cpu"};
   for (const std::string& flag : testing::TinyFlags()) reconstruct.push_back(flag);

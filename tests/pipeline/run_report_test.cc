@@ -15,11 +15,8 @@
 namespace regrade {
 namespace {
 
+using testing::Regrade;
 using testing::TemporaryFolder;
-
-testing::ProgramOutcome Regrade(const std::vector<std::string>& arguments) {
-  return testing::RunProgram(REGRADE_PROGRAM, arguments);
-}
 
 int HeatMapFiles(const std::string& folder) {
   int files = 0;
@@ -68,7 +65,7 @@ void ExpectDocumented(const std::set<std::string>& keys) {
 TEST(RunReport, ShowsEveryPartOfTheRun) {
   const TemporaryFolder folder;
   const std::string style = testing::SourceDir() + "/assets/style_sunset.png";
-  ASSERT_EQ(Regrade({"synth", folder / "s", "--views", "6", "--size", "96x72"}).code, 0);
+  testing::WriteCapture(folder / "s", 6, "96x72");
   std::vector<std::string> run{"run",       folder / "s/truth", "--style",  style,
                                "--out",     folder / "e",       "--preset", "draft",
                                "--effects", "exposure=off",     "--device", "cpu",
@@ -223,7 +220,7 @@ TEST(RunReport, H157_H158_AGreyStyleIsNamedAndWithoutEvaluationNothingMoves) {
   Image grey(32, 24, 3);
   for (float& value : grey.pixels) value = 0.5f;
   WritePng8(folder / "grey.png", grey);
-  ASSERT_EQ(Regrade({"synth", folder / "s", "--views", "6", "--size", "96x72"}).code, 0);
+  testing::WriteCapture(folder / "s", 6, "96x72");
   std::vector<std::string> flags = testing::TinyFlags();
   flags.insert(flags.end(),
                {"--out", folder / "e", "--preset", "draft", "--effects", "exposure=off"});

@@ -23,7 +23,7 @@
 namespace regrade {
 namespace {
 
-constexpr double kStep = 0.03;  // regrade page's
+constexpr double kSplatPageStep = 0.03;  // regrade page's
 
 RadianceField FieldOf(int64_t count, int basis, bool antialiased = false) {
   const GridFrame box{{}, {0.1f, 0, -0.2f}, {0.8f, 1, 0.7f}};
@@ -41,7 +41,7 @@ TEST(SplatCodec, DecodedSplatsRenderAsTheExactOnes) {
   for (const int basis : {1, 4, 9})
     for (const bool antialiased : {false, true}) {
       const RadianceField field = FieldOf(800, basis, antialiased);
-      const RadianceField decoded = DecodeField(EncodeField(field, kStep));
+      const RadianceField decoded = DecodeField(EncodeField(field, kSplatPageStep));
       EXPECT_EQ(decoded.geometry->splats.antialiased, antialiased);
       EXPECT_GE(testing::Psnr(Picture(field), Picture(decoded)), 48) << basis;
     }
@@ -50,7 +50,7 @@ TEST(SplatCodec, DecodedSplatsRenderAsTheExactOnes) {
 // A page has harmonics of degree 2 at most.
 TEST(SplatCodec, HigherHarmonicsAreLeftOut) {
   const RadianceField field = FieldOf(800, 16);
-  const RadianceField decoded = DecodeField(EncodeField(field, kStep));
+  const RadianceField decoded = DecodeField(EncodeField(field, kSplatPageStep));
   EXPECT_EQ(decoded.appearance.basis, 9);
   RadianceField lower = field;
   lower.appearance = LimitShBasis(field.appearance, 9);
@@ -62,7 +62,7 @@ TEST(SplatCodec, AStyleOfDegreeThreeIsAppliedToThePagesHarmonics) {
   StoredNetwork stored{testing::RandomNetwork(7, 1.1, 16), 1, {}};
   stored.network.data().has_base = true;
   stored.network.data().base = testing::SomeMap();
-  RadianceField page = DecodeField(EncodeField(FieldOf(200, 16), kStep));
+  RadianceField page = DecodeField(EncodeField(FieldOf(200, 16), kSplatPageStep));
   const PageStyle style = EncodeStyle(stored, page, 1);
   EXPECT_EQ(style.header.At("bound").AsDouble(), stored.network.Bound());
   RadianceField padded = page;
@@ -137,7 +137,7 @@ TEST(SplatCodec, FirstComeThoseThatContributeMost) {
 // What a style adds splat by splat needs the same order from both fields.
 TEST(SplatCodec, OrderIsThatOfTheDecodedField) {
   const RadianceField field = FieldOf(500, 4);
-  const PageField page = EncodeField(field, kStep);
+  const PageField page = EncodeField(field, kSplatPageStep);
   const RadianceField decoded = DecodeField(page);
   const PageVoxels of = RecordsInPageOrder(page, *field.geometry),
                    own = RecordsInPageOrder(page, *decoded.geometry);

@@ -27,12 +27,9 @@ namespace {
 namespace fs = std::filesystem;
 using testing::ProgramOutcome;
 using testing::ReadText;
+using testing::Regrade;
 using testing::TemporaryFolder;
 using testing::WriteText;
-
-ProgramOutcome Regrade(const std::vector<std::string>& arguments) {
-  return testing::RunProgram(REGRADE_PROGRAM, arguments);
-}
 
 std::string Asset(const std::string& name) {
   return testing::SourceDir() + "/assets/style_" + name + ".png";

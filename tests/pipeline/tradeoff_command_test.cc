@@ -12,11 +12,8 @@ namespace regrade {
 namespace {
 
 using testing::ProgramOutcome;
+using testing::Regrade;
 using testing::TemporaryFolder;
-
-ProgramOutcome Regrade(const std::vector<std::string>& arguments) {
-  return testing::RunProgram(REGRADE_PROGRAM, arguments);
-}
 
 size_t Count(const std::string& text, const std::string& what) {
   size_t count = 0;
@@ -28,7 +25,7 @@ size_t Count(const std::string& text, const std::string& what) {
 TEST(TradeoffCommand, MeasuresContinuesAndPredicts) {
   const TemporaryFolder folder;
   const std::string style = testing::SourceDir() + "/assets/style_sunset.png";
-  ASSERT_EQ(Regrade({"synth", folder / "s", "--views", "6", "--size", "96x72"}).code, 0);
+  testing::WriteCapture(folder / "s", 6, "96x72");
   const auto tradeoff = [&](const std::vector<std::string>& more) {
     std::vector<std::string> words{"tradeoff",     folder / "s/truth",
                                    "--style",      style,
@@ -122,7 +119,7 @@ TEST(TradeoffCommand, MeasuresContinuesAndPredicts) {
 
 TEST(TradeoffCommand, VariesFitsOfSplats) {
   const TemporaryFolder folder;
-  ASSERT_EQ(Regrade({"synth", folder / "s", "--views", "6", "--size", "96x72"}).code, 0);
+  testing::WriteCapture(folder / "s", 6, "96x72");
   std::vector<std::string> words{
       "tradeoff",     folder / "s/truth",
       "--out",        folder / "t",

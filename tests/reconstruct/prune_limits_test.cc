@@ -54,7 +54,7 @@ class PruneBy : public ::testing::Test {
   }
   int64_t Voxels() {
     const SceneBox box;
-    return FitField({{camera_, &photo_}}, box, options_, {}).voxels;
+    return regrade::FitField({{camera_, &photo_}}, box, options_, {}).voxels;
   }
   Image photo_;
   Camera camera_;

@@ -8,6 +8,7 @@ need not exist: an input error (exit status 3) comes after the options were read
 Exit status: 0, or 1 if there is a finding.
 """
 
+import functools
 import os
 import re
 import shlex
@@ -50,6 +51,7 @@ class Program:
             self.options[command] = set(re.findall(r"^ +--([a-z0-9-]+)", self.run([command, "--help-all"]).stdout, re.M))
         return self.options[command]
 
+    @functools.cache
     def problem(self, text):
         """What is wrong with a command, or nothing."""
         words = shlex.split(text.replace("|CAPTURE", "").replace(" ...", "").replace("[", "").replace("]", ""))[1:]

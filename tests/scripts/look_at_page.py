@@ -219,7 +219,7 @@ def check_folder(browser, arguments):
         with open(path[:-5] + ".json", encoding="utf-8") as file:
             views = json.load(file)
         for size_name, size in SIZES.items() if number == 0 else [("phone", SIZES["phone"])]:
-            page = open_page(browser, path, size, scale=1 if number == 0 or arguments.shots else FEW_PIXELS)
+            page = open_page(browser, path, size, scale=1 if (number == 0 and size_name == "phone") or arguments.shots else FEW_PIXELS)
             here = check_controls(page, size[0]) + check_places(page, size) + check_names(page)
             if size_name == "phone":
                 here += compare_pictures(page, views) + check_bound(page)
@@ -233,7 +233,7 @@ def check_folder(browser, arguments):
             found += [f"{name}, {size_name}: {complaint}" for complaint in here]
             page.close()
         if number == 0 or name in ("uniform", "spheres", "spheres_object", "splats"):
-            found += [f"{name}, opening: {c}" for c in check_coarse_first(browser, path) + check_without_workers(browser, path, views)]
+            found += [f"{name}, opening: {c}" for c in check_coarse_first(browser, path) + check_without_workers(browser, path, views, number == 0)]
         if number == 0 or name in ("uniform_near", "levels_residual", "splats"):
             found += [f"{name}, {c}" for c in check_graphics(browser, path, views)]
     return found

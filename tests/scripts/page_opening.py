@@ -122,9 +122,10 @@ def check_coarse_first(browser, path):
     return found
 
 
-def check_without_workers(browser, path, views):
+def check_without_workers(browser, path, views, broken):
+    """Without workers, and with broken ones where `broken` says so: from there on the page does the same."""
     found = []
-    for name, script in [("no workers", NO_WORKERS), ("broken workers", BROKEN_WORKERS)]:
+    for name, script in [("no workers", NO_WORKERS)] + [("broken workers", BROKEN_WORKERS)] * broken:
         page = open_page(browser, path, SIZES["phone"], script, FEW_PIXELS)
         found += [f"{name}: {c}" for c in compare_pictures(page, views[:1] + views[-1:]) + complaints(page)]
         page.close()

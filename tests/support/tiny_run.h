@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "kernels/process/child_process.h"
+#include "pipeline/synth/synth_capture.h"
 
 namespace regrade::testing {
 
@@ -24,6 +25,22 @@ inline ProgramOutcome RunProgram(const std::string& program,
       RunChild(options, [&outcome](const std::string& line) { outcome.text += line + "\n"; });
   outcome.code = result.end == ChildEnd::kExited ? result.exit_status : 128 + result.signal;
   return outcome;
+}
+
+inline ProgramOutcome Regrade(const std::vector<std::string>& arguments) {
+  return RunProgram(REGRADE_PROGRAM, arguments);
+}
+
+inline int ExitCodeOf(const std::vector<std::string>& arguments) {
+  return Regrade(arguments).code;
+}
+
+// `regrade synth`, without a start of the program.
+inline void WriteCapture(const std::string& folder, int views, const std::string& size) {
+  SynthOptions options;
+  options.views = views;
+  options.size = size;
+  WriteSyntheticCapture(folder, options, {});
 }
 
 // Options for the smallest possible fit, style and film: three frames, at which it is measured,

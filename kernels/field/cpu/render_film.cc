@@ -12,7 +12,7 @@
 namespace regrade {
 namespace {
 
-constexpr int kTile = 32;
+constexpr int kFilmTile = 32;
 constexpr int kBatch = 256;  // rays
 
 struct Offset {
@@ -76,13 +76,14 @@ class FilmFrameRenderer {
   // All pixels of one of the three sets; their neighbours are known from the passes before.
   template <typename IsOfSet>
   void Pass(const IsOfSet& is_of_set, const Neighbours* neighbours) {
-    const int tiles_x = (width_ + kTile - 1) / kTile, tiles_y = (height_ + kTile - 1) / kTile;
+    const int tiles_x = (width_ + kFilmTile - 1) / kFilmTile,
+              tiles_y = (height_ + kFilmTile - 1) / kFilmTile;
 #pragma omp parallel for schedule(dynamic, 1)
     for (int tile = 0; tile < tiles_x * tiles_y; ++tile) {
-      const int x0 = tile % tiles_x * kTile, y0 = tile / tiles_x * kTile;
+      const int x0 = tile % tiles_x * kFilmTile, y0 = tile / tiles_x * kFilmTile;
       Batch batch;
-      for (int y = y0; y < std::min(y0 + kTile, height_); ++y)
-        for (int x = x0; x < std::min(x0 + kTile, width_); ++x) {
+      for (int y = y0; y < std::min(y0 + kFilmTile, height_); ++y)
+        for (int x = x0; x < std::min(x0 + kFilmTile, width_); ++x) {
           if (!is_of_set(x, y)) continue;
           const size_t pixel =
               static_cast<size_t>(y) * static_cast<size_t>(width_) + static_cast<size_t>(x);
