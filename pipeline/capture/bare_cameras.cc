@@ -86,8 +86,9 @@ std::vector<BareCamera> CamerasOfFolder(const fs::path& root) {
 std::vector<BareCamera> ReadCamerasJson(const std::string& path) {
   const JsonValue file = ReadJsonFile(path, kMostBytes);
   if (!file.IsArray())
-    throw InputError("is not a list of cameras", path,
-                     "give a cameras.json of 3D Gaussian Splatting, or the folder of a capture");
+    throw InputError(
+        "is not a list of cameras", path,
+        "give a cameras.json of 3D Gaussian Splatting, or the folder of a capture");
   std::vector<BareCamera> cameras;
   for (const JsonValue& entry : file.AsArray()) cameras.push_back(CameraOf(entry));
   std::ranges::stable_sort(cameras, {}, &BareCamera::name);

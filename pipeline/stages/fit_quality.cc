@@ -67,12 +67,12 @@ void MeasureFit(const WorkingViews& views, const StoredField& stored, Backend ba
   if (const Metric& kept =
           metrics->heldout.empty() ? metrics->detail_kept_train : metrics->detail_kept_heldout;
       kept.value)
-    console->Info(
-        Format("the scene shows %.0f %% of the fine detail of %s: %s", 100 * *kept.value,
-               metrics->heldout.empty() ? "the photos"
-               : given ? "some photos, to which it may have been fitted"
-                       : "photos that were kept out of the fit",
-               metrics->sharpness.c_str()));
+    console->Info(Format("the scene shows %.0f %% of the fine detail of %s: %s",
+                         100 * *kept.value,
+                         metrics->heldout.empty() ? "the photos"
+                         : given ? "some photos, to which it may have been fitted"
+                                 : "photos that were kept out of the fit",
+                         metrics->sharpness.c_str()));
   console->Detail(QualityLine(*metrics));
 }
 

@@ -17,10 +17,14 @@ namespace {
 
 const char* NameOf(SplatFormat format) {
   switch (format) {
-    case SplatFormat::kPly: return "PLY";
-    case SplatFormat::kCompressedPly: return "compressed PLY";
-    case SplatFormat::kSpz: return "SPZ";
-    case SplatFormat::kSplat: return ".splat";
+    case SplatFormat::kPly:
+      return "PLY";
+    case SplatFormat::kCompressedPly:
+      return "compressed PLY";
+    case SplatFormat::kSpz:
+      return "SPZ";
+    case SplatFormat::kSplat:
+      return ".splat";
   }
   return "";
 }
@@ -30,17 +34,15 @@ int DegreeOf(int basis) { return static_cast<int>(std::lround(std::sqrt(basis)))
 }  // namespace
 
 SplatScene ReadForeignSplats(const RunContext& context, bool say) {
-  const uint64_t memory = PlannedMemory(context.settings.run.max_memory_gb,
-                                        ReadMemoryStatus().available);
+  const uint64_t memory =
+      PlannedMemory(context.settings.run.max_memory_gb, ReadMemoryStatus().available);
   SplatScene scene =
       memory > 0 ? ReadSplats(context.source, memory) : ReadSplats(context.source);
   const int basis = scene.splats.basis;
   LowerBasis(kMostFieldBasis, &scene.splats);
   if (!say) return scene;
   const std::string name = std::filesystem::path(context.source).filename().string();
-  const auto info = [&](const std::string& text) {
-    context.console->Info(name + ": " + text);
-  };
+  const auto info = [&](const std::string& text) { context.console->Info(name + ": " + text); };
   info(Concat(scene.splats.count(), " splats with colours of degree ", DegreeOf(basis), ", ",
               NameOf(scene.format), (scene.antialiased ? ", antialiased" : "")));
   if (basis > kMostFieldBasis)

@@ -15,9 +15,9 @@ namespace regrade {
 namespace {
 
 constexpr int64_t kMostPoints = 8000;
-constexpr int kSide = 160;               // pixels of the longer side of the depths
-constexpr double kSameDepth = 0.05;      // relative: a splat at the depth that a view shows
-constexpr float kOpaqueLogit = -0.85f;   // opacity 0.3: others show little by themselves
+constexpr int kSide = 160;              // pixels of the longer side of the depths
+constexpr double kSameDepth = 0.05;     // relative: a splat at the depth that a view shows
+constexpr float kOpaqueLogit = -0.85f;  // opacity 0.3: others show little by themselves
 
 Camera Small(const Camera& camera) {
   const Camera pinhole = camera.Undistorted();
@@ -66,8 +66,7 @@ void AddSplatPoints(const RadianceField& field, const FieldRenderer& renderer,
     const Camera small = Small(capture->views[v].camera);
     const Image depths = renderer.Render(small).depth;
     for (ScenePoint& point : points)
-      if (Shows(small, depths, point.position))
-        point.views.push_back(static_cast<int32_t>(v));
+      if (Shows(small, depths, point.position)) point.views.push_back(static_cast<int32_t>(v));
   }
   std::erase_if(points, [](const ScenePoint& point) { return point.views.size() < 2; });
   if (points.size() < kFewestSplatPoints)

@@ -54,8 +54,8 @@ std::vector<BareCamera> PlacedCameras(const RunContext& context, const Splats& s
   context.console->Info(placed.summary);
   std::vector<BareCamera> cameras;
   for (const int i : SmoothOrder(placed.cameras))
-    cameras.push_back({Format("view%02zu.png", cameras.size()),
-                       placed.cameras[static_cast<size_t>(i)]});
+    cameras.push_back(
+        {Format("view%02zu.png", cameras.size()), placed.cameras[static_cast<size_t>(i)]});
   return cameras;
 }
 

@@ -16,8 +16,9 @@ namespace {
 std::string CommentOf(const RunContext& context) {
   const StyleSource& style = context.settings.style;
   const StoredNetwork network = ReadNetworkFile(context.style->Path("network.npz"));
-  std::string comment = "restyled by regrade " REGRADE_VERSION ": style " + style.name +
-                        Format(", Lipschitz bound of the colours %.3f", network.network.Bound());
+  std::string comment =
+      "restyled by regrade " REGRADE_VERSION ": style " + style.name +
+      Format(", Lipschitz bound of the colours %.3f", network.network.Bound());
   if (style.strength != 1) comment += Format(", strength %.3g", style.strength);
   return comment;
 }

@@ -15,15 +15,15 @@
 namespace regrade {
 namespace {
 
-constexpr double kFocal = 0.9;  // over the picture's width: 58 degrees wide
-constexpr int kProbeWidth = 64, kProbeHeight = 48;
+constexpr double kFocal = 0.9;  // over the picture's longer side: 58 degrees
+constexpr int kProbeSide = 64;  // pixels
 constexpr int64_t kSamples = 3000;
-// An object's pictures: most of their edges are empty.
-constexpr double kAlone = 0.7;
-// How much more a scene must show from within than from outside to be taken for a room.
-constexpr double kRoomShowsMore = 1.3;
+constexpr double kMargin = 1.2;       // around an object: a film cuts corners
+constexpr double kPortrait = 0.85;    // of the distance: so much nearer shows an object upright
 constexpr double kFewestHoles = 0.6;  // quality of a view over the middle one
-constexpr double kFarFromBest = 0.3;  // worth of a view over the best one's
+constexpr double kFarFromBest = 0.45;  // worth of a view over the best one's
+// Of objects 1.2 to 2.6; a room whose walls look as well from behind has 1.02.
+constexpr double kObjectShowsMore = 1.1;
 // A view is too similar to another one within this part of the radius and this angle.
 constexpr double kSamePlace = 0.12, kSameWay = 0.97;
 
@@ -40,10 +40,12 @@ struct Stage {
   }
 };
 
-Camera LookAt(const Vec3d& from, const Vec3d& way, const Vec3d& up, int width) {
+Camera LookAt(const Vec3d& from, const Vec3d& way, const Vec3d& up, int longest,
+              bool portrait) {
   Camera camera;
-  camera.width = width, camera.height = width * 3 / 4;
-  camera.fx = camera.fy = kFocal * width;
+  camera.width = longest, camera.height = longest * 3 / 4;
+  if (portrait) std::swap(camera.width, camera.height);
+  camera.fx = camera.fy = kFocal * longest;
   camera.cx = 0.5 * camera.width, camera.cy = 0.5 * camera.height;
   const Vec3d front = Normalized(way), right = Normalized(Cross(front, up));
   camera.camera_from_world.rotation.row[0] = right;
@@ -72,56 +74,63 @@ class Placement {
   Placement(const FieldRenderer& renderer, Stage stage, std::vector<SplatSample> samples)
       : renderer_(renderer), stage_(std::move(stage)), samples_(std::move(samples)) {}
 
-  Candidate Probe(const Vec3d& from, const Vec3d& way) const {
-    Candidate candidate{LookAt(from, way, stage_.up, kProbeWidth), {}};
-    candidate.probe = ProbeView(renderer_, candidate.camera, samples_);
-    // What is right before the camera hides the rest, and a film would pass through it.
-    const bool free = candidate.probe.nearest > 0.1 * stage_.extent.inner;
-    candidate.filled =
-        free ? std::pow(candidate.probe.opaque, 3) * candidate.probe.Quality() : 0;
-    return candidate;
-  }
-
-  std::vector<Candidate> Ring(double distance, double elevation, int count,
-                              double turn) const {
-    std::vector<Candidate> ring;
-    for (int i = 0; i < count; ++i) {
-      const Vec3d way =
-          stage_.Way(2 * std::numbers::pi * (i + turn) / count, Radians(elevation));
-      ring.push_back(Probe(stage_.extent.center + way * distance, -way));
+  // Three rings on which an object as large as this scene fits into its pictures.
+  std::vector<Candidate> Rings(const ProgressFunction& progress) const {
+    const Vec3d middle = Middle();
+    std::vector<Vec3d> ways;
+    for (const auto& [elevation, count, turn] :
+         {std::tuple{4.0, 14, 0.0}, std::tuple{22.0, 12, 0.5}, std::tuple{45.0, 10, 0.0}})
+      for (int i = 0; i < count; ++i)
+        ways.push_back(
+            stage_.Way(2 * std::numbers::pi * (i + turn) / count, Radians(elevation)));
+    double distance[2] = {};
+    for (const bool portrait : {false, true})
+      for (const Vec3d& way : ways)
+        distance[portrait] =
+            std::max(distance[portrait], FittingDistance(middle, way, portrait));
+    const bool portrait = distance[1] < kPortrait * distance[0];
+    std::vector<Candidate> rings;
+    for (const Vec3d& way : ways) {
+      ReportOrThrow(progress, static_cast<double>(rings.size()),
+                    static_cast<double>(ways.size()));
+      rings.push_back(Probe(middle + way * distance[portrait], -way, portrait));
     }
-    return ring;
+    return rings;
   }
 
   // Places near the middle, with views all round.
   std::vector<Candidate> Within(const ProgressFunction& progress) const {
+    constexpr int kDirections = 10;
     std::vector<Candidate> within;
-    constexpr int kDirections = 12;
-    constexpr double kSteps[] = {0, -0.5, 0.5};
-    int done = 0;
     for (const double height : {0.0, -0.25})
-      for (const double e : kSteps)
-        for (const double n : kSteps) {
-          ReportOrThrow(progress, done++, 18);
-          const Vec3d from =
-              stage_.extent.center + (stage_.east * e + stage_.north * n +
-                                      stage_.up * height) * stage_.extent.inner;
-          for (int i = 0; i < kDirections; ++i)
-            within.push_back(Probe(
-                from, stage_.Way(2 * std::numbers::pi * i / kDirections, Radians(-5))));
-        }
+      for (const auto& [e, n] : {std::pair{0.0, 0.0}, std::pair{0.5, 0.0}, std::pair{0.0, 0.5},
+                                 std::pair{-0.5, 0.0}, std::pair{0.0, -0.5}}) {
+        ReportOrThrow(progress, static_cast<double>(within.size()), 10 * kDirections);
+        const Vec3d from =
+            stage_.extent.center +
+            (stage_.east * e + stage_.north * n + stage_.up * height) * stage_.extent.inner;
+        for (int i = 0; i < kDirections; ++i)
+          within.push_back(Probe(
+              from, stage_.Way(2 * std::numbers::pi * i / kDirections, Radians(-5)), false));
+      }
     return within;
   }
 
+  // Places around the middle at some distances, which look at it.
   std::vector<Candidate> Around(const ProgressFunction& progress) const {
+    constexpr int kDirections = 12;
     std::vector<Candidate> around;
     int done = 0;
-    for (const double distance : {0.6, 1.0, 1.5, 2.1, 3.0})
-      for (const double elevation : {-8.0, 8.0, 24.0, 45.0}) {
+    for (const double distance : {0.7, 1.1, 1.7, 2.6})
+      for (const double elevation : {-8.0, 8.0, 24.0, 45.0, 70.0}) {
         ReportOrThrow(progress, done, 20);
-        std::ranges::move(
-            Ring(distance * stage_.extent.radius, elevation, 16, 0.5 * (done++ % 2)),
-            std::back_inserter(around));
+        const double turn = 0.5 * (done++ % 2);
+        for (int i = 0; i < kDirections; ++i) {
+          const Vec3d way =
+              stage_.Way(2 * std::numbers::pi * (i + turn) / kDirections, Radians(elevation));
+          around.push_back(Probe(stage_.extent.center + way * (distance * stage_.extent.inner),
+                                 -way, false));
+        }
       }
     return around;
   }
@@ -158,30 +167,53 @@ class Placement {
   }
 
  private:
+  Candidate Probe(const Vec3d& from, const Vec3d& way, bool portrait) const {
+    Candidate candidate{LookAt(from, way, stage_.up, kProbeSide, portrait), {}};
+    candidate.probe = ProbeView(renderer_, candidate.camera, samples_);
+    // What is right before the camera hides the rest, and a film would pass through it.
+    const bool free = candidate.probe.nearest > 0.1 * stage_.extent.inner;
+    candidate.filled =
+        free ? std::pow(candidate.probe.opaque, 3) * candidate.probe.Quality() : 0;
+    return candidate;
+  }
+
+  // Of the box with all but a hundredth of the samples at each end.
+  Vec3d Middle() const {
+    Vec3d middle;
+    for (const Vec3d& axis : {stage_.up, stage_.east, stage_.north}) {
+      std::vector<double> along;
+      for (const SplatSample& sample : samples_) along.push_back(Dot(axis, sample.mean));
+      middle = middle + axis * (0.5 * (Quantile(along, 0.01) + Quantile(along, 0.99)));
+    }
+    return middle;
+  }
+
+  // At which nearly all samples are in the picture from there.
+  double FittingDistance(const Vec3d& middle, const Vec3d& way, bool portrait) const {
+    const Camera camera = LookAt(middle, -way, stage_.up, 1000, portrait);
+    const double wide = 0.5 * camera.width / camera.fx, high = 0.5 * camera.height / camera.fy;
+    std::vector<double> needed;
+    for (const SplatSample& sample : samples_) {
+      const Vec3d p = camera.camera_from_world * sample.mean;
+      needed.push_back(std::max(std::abs(p.x) / wide, std::abs(p.y) / high) - p.z);
+    }
+    return kMargin * Quantile(needed, 0.99);
+  }
+
   const FieldRenderer& renderer_;
   Stage stage_;
   std::vector<SplatSample> samples_;
 };
 
-// At which an object fits into the picture's height.
-double FittingDistance(const SplatExtent& extent) {
-  constexpr double kMargin = 1.02;
-  const double half_height = 0.5 * 0.75 / kFocal;  // tangent of half the angle
-  return kMargin * extent.outer * std::sqrt(1 + 1 / (half_height * half_height));
-}
-
-double MeanOf(const std::vector<Candidate>& candidates,
-              const auto& value) {
+// The part of the samples that the candidates show together, each as well as the best of them.
+double ShownBy(const std::vector<Candidate>& candidates, const auto& quality) {
+  std::vector<double> best(candidates.at(0).probe.seen.size(), 0);
+  for (const Candidate& candidate : candidates)
+    for (size_t k = 0; k < best.size(); ++k)
+      best[k] = std::max(best[k], quality(candidate) * double{candidate.probe.seen[k]});
   double sum = 0;
-  for (const Candidate& candidate : candidates) sum += value(candidate);
-  return sum / static_cast<double>(std::max<size_t>(1, candidates.size()));
-}
-
-// The best tenth counts: most places in a scene are bad.
-double WorthOfBest(const std::vector<Candidate>& candidates) {
-  std::vector<double> worth;
-  for (const Candidate& candidate : candidates) worth.push_back(candidate.Worth());
-  return Quantile(worth, 0.9);
+  for (const double shown : best) sum += shown;
+  return sum / static_cast<double>(std::max<size_t>(1, best.size()));
 }
 
 std::vector<Candidate> WithoutHoles(std::vector<Candidate> views) {
@@ -207,44 +239,31 @@ Stage StageOf(const Splats& splats, const Vec3d& up) {
 PlacedViews PlaceViews(const Splats& splats, const FieldRenderer& renderer, const Vec3d& up,
                        int longest, const std::string& where,
                        const ProgressFunction& progress) {
-  const Stage stage = StageOf(splats, up);
-  const Placement placement(renderer, stage, SampleSplats(splats, kSamples));
-  ProgressParts parts(progress, 3);
-  const double distance = FittingDistance(stage.extent);
-  std::vector<Candidate> rings;
-  for (const auto& [elevation, count, turn] :
-       {std::tuple{4.0, 14, 0.0}, std::tuple{22.0, 12, 0.5}, std::tuple{45.0, 10, 0.0}})
-    std::ranges::move(placement.Ring(distance, elevation, count, turn),
-                      std::back_inserter(rings));
-  ReportOrThrow(parts.Next(1), 1, 1);
-  const double border = MeanOf(rings, [](const Candidate& c) { return c.probe.border; });
+  const Placement placement(renderer, StageOf(splats, up), SampleSplats(splats, kSamples));
+  ProgressParts parts(progress, 4);
+  const std::vector<Candidate> rings = placement.Rings(parts.Next(0.5));
   std::vector<Candidate> all = placement.Within(parts.Next(1));
-  // An object does not fill its pictures.
-  const auto worth_of_object = [](const Candidate& c) { return c.probe.Quality() * c.Seen(); };
-  const double outside = MeanOf(rings, worth_of_object), within = WorthOfBest(all);
-  const bool alone = border > kAlone, object = alone && within < kRoomShowsMore * outside;
-  PlacedViews placed;
-  std::vector<Candidate> chosen;
-  std::string kind;
-  if (object) {
-    chosen = WithoutHoles(rings);
-    kind = "an object seen from outside";
-  } else {
-    std::ranges::move(placement.Around(parts.Next(1)), std::back_inserter(all));
-    chosen = placement.Choose(std::move(all));
-    kind = alone ? "a room seen from within" : "a scene with surroundings";
-  }
-  if (chosen.size() < 2)
+  std::ranges::move(placement.Around(parts.Next(2.5)), std::back_inserter(all));
+  const double outside = ShownBy(rings, [](const Candidate&c) { return c.probe.Quality(); }),
+               filled = ShownBy(all, [](const Candidate&c) { return c.filled; });
+  const bool object = outside > kObjectShowsMore * filled;
+  const std::vector<Candidate> chosen =
+      object ? WithoutHoles(rings) : placement.Choose(std::move(all));
+  if (chosen.size() < 2 || !(std::max(outside, filled) > 0))
     throw InputError("no place shows the splats without holes", where,
                      "give the cameras of its photos: --cameras");
+  PlacedViews placed;
   for (const Candidate& candidate : chosen) {
-    Camera camera = candidate.camera.Resized(longest, longest * 3 / 4);
-    placed.cameras.push_back(camera);
+    const Camera& small = candidate.camera;
+    const int across = longest * 3 / 4;
+    placed.cameras.push_back(small.width > small.height ? small.Resized(longest, across)
+                                                        : small.Resized(across, longest));
   }
   placed.summary = Format(
-      "%s (edges of its pictures are %.0f %% empty; it shows %.3f from within, %.3f from "
-      "outside): %zu views",
-      kind.c_str(), 100 * border, within, outside, placed.cameras.size());
+      "%s: %zu views (three rings around it show %.0f %% of it well, the best views that it "
+      "fills %.0f %%)",
+      object ? "an object, seen from outside" : "a scene with surroundings, seen from within",
+      chosen.size(), 100 * outside, 100 * filled);
   return placed;
 }
 

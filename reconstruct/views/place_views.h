@@ -14,16 +14,16 @@ namespace regrade {
 inline constexpr int kMostPlacedViews = 36;
 
 struct PlacedViews {
-  std::vector<Camera> cameras;  // pinholes of 4:3, `longest` pixels wide
-  std::string summary;          // "an object seen from outside: 36 views on 3 rings around it"
+  std::vector<Camera> cameras;  // pinholes of 4:3, or 3:4 for upright objects
+  std::string summary;          // "an object, seen from outside: 36 views ..."
 };
 
-// `renderer` draws `splats`, in whose world `up` is. An object is what stands alone: pictures
-// that it fits into are empty along their edges, and it shows more from outside than from
-// within. It is seen from three rings around it. Another scene is seen from places around and
-// inside of its middle: of some hundreds of candidates, those that show much of it, filled and
-// without holes, each adding to what the ones before show. Where a place shows holes it is left
-// out. The same splats give the same views. Throws Error(kInput) with `where` if no place shows
+// `renderer` draws `splats`, in whose world `up` is. If three rings around them, from which
+// they fit into the picture, show clearly more of them well than the best views that they fill,
+// they are an object, and the rings are its views, without those that show holes. Else views
+// are chosen from some hundreds of candidates around and within the middle of the scene: those
+// that show much of it, filled and without holes, each adding to what the ones before show. The
+// same splats give the same views. Throws Error(kInput) with `where` if no place shows
 // anything, Interrupted.
 PlacedViews PlaceViews(const Splats& splats, const FieldRenderer& renderer, const Vec3d& up,
                        int longest, const std::string& where, const ProgressFunction& progress);

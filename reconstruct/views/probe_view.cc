@@ -41,7 +41,8 @@ std::vector<SplatSample> SampleSplats(const Splats& splats, int64_t most) {
   const int64_t count = std::min(most, std::ssize(opaque));
   std::vector<SplatSample> samples;
   for (int64_t k = 0; k < count; ++k) {
-    const Splat<float> splat = view[opaque[static_cast<size_t>(k * std::ssize(opaque) / count)]];
+    const Splat<float> splat =
+        view[opaque[static_cast<size_t>(k * std::ssize(opaque) / count)]];
     const double a = splat.log_scale[0], b = splat.log_scale[1], c = splat.log_scale[2];
     const double middle = std::max(std::min(a, b), std::min(std::max(a, b), c));
     samples.push_back({splat.mean.Cast<double>(), std::exp(std::min(80.0, middle))});
@@ -68,14 +69,16 @@ ViewProbe ProbeView(const FieldRenderer& renderer, const Camera& camera,
       if (!(depth > 0)) continue;
       ++opaque;
       depths.push_back(depth);
-      for (const double other : {x > 0 ? depth_at(x - 1, y) : 0, y > 0 ? depth_at(x, y - 1) : 0})
+      for (const double other :
+           {x > 0 ? depth_at(x - 1, y) : 0, y > 0 ? depth_at(x, y - 1) : 0})
         if (other > 0)
           ++pairs, jumps += std::abs(depth - other) > kJump * std::min(depth, other);
     }
   const auto pixels = static_cast<double>(view.color.num_pixels());
   probe.opaque = static_cast<double>(opaque) / pixels;
   probe.empty = static_cast<double>(empty) / pixels;
-  probe.border = static_cast<double>(border_empty) / static_cast<double>(std::max<int64_t>(1, border));
+  probe.border =
+      static_cast<double>(border_empty) / static_cast<double>(std::max<int64_t>(1, border));
   probe.rough = pairs > 0 ? static_cast<double>(jumps) / static_cast<double>(pairs) : 1;
   probe.nearest = Quantile(depths, 0.02);
   for (const SplatSample& sample : samples)

@@ -17,6 +17,7 @@ constexpr double kFlat = 0.4;                    // thickness over the next axis
 const double kNearWay = std::cos(0.52);          // 30 degrees: of the first mean
 const double kOnPlane = std::cos(0.21);          // 12 degrees
 constexpr double kShareOfGround = 0.09;          // 4 times that of axes in all directions
+constexpr double kFewestOnGround = 0.03;         // of all opaque splats
 constexpr double kLow = 0.35, kMostTilt = 0.82;  // quantile of heights; cosine of 35 degrees
 
 struct FlatSplat {
@@ -81,7 +82,8 @@ std::optional<Vec3d> GroundNear(const std::vector<FlatSplat>& flat, const Splats
   for (int64_t i = 0; i < splats.count(); ++i)
     if (splats.opacity_logit[static_cast<size_t>(i)] >= kOpaqueLogit)
       all.push_back(Dot(splats.view()[i].mean.Cast<double>(), up));
-  if (on_plane < kShareOfGround * total || Median(ground) > Quantile(all, kLow))
+  if (static_cast<double>(ground.size()) < kFewestOnGround * static_cast<double>(all.size()) ||
+      on_plane < kShareOfGround * total || Median(ground) > Quantile(all, kLow))
     return std::nullopt;
   return up;
 }

@@ -33,8 +33,8 @@ SplatExtent ExtentOf(const Splats& splats) {
     extent.center[a] = WeightedQuantile(values, 0.5);
   }
   for (int64_t i = 0; i < view.count; ++i)
-    values[static_cast<size_t>(i)] = {
-        Norm(view[i].mean.Cast<double>() - extent.center), weight(i)};
+    values[static_cast<size_t>(i)] = {Norm(view[i].mean.Cast<double>() - extent.center),
+                                      weight(i)};
   extent.radius = WeightedQuantile(values, 0.9);
   extent.inner = WeightedQuantile(values, 0.5);
   extent.outer = WeightedQuantile(values, 0.98);
