@@ -10,9 +10,6 @@
 
 namespace regrade {
 
-// The most harmonics that a field and its styles have.
-inline constexpr int kMostFieldBasis = 9;
-
 // Leaves out the harmonics from `basis` on.
 void LowerBasis(int basis, Splats* splats);
 

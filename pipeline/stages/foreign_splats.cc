@@ -4,6 +4,7 @@
 #include <filesystem>
 
 #include "kernels/base/error.h"
+#include "kernels/field/spherical_harmonics.h"
 #include "kernels/splats/splat_field.h"
 #include "pipeline/files/text.h"
 #include "pipeline/program/memory.h"
@@ -39,14 +40,14 @@ SplatScene ReadForeignSplats(const RunContext& context, bool say) {
   SplatScene scene =
       memory > 0 ? ReadSplats(context.source, memory) : ReadSplats(context.source);
   const int basis = scene.splats.basis;
-  LowerBasis(kMostFieldBasis, &scene.splats);
+  LowerBasis(kMaxBasis, &scene.splats);
   if (!say) return scene;
   const std::string name = std::filesystem::path(context.source).filename().string();
   const auto info = [&](const std::string& text) { context.console->Info(name + ": " + text); };
   info(Concat(scene.splats.count(), " splats with colours of degree ", DegreeOf(basis), ", ",
               NameOf(scene.format), (scene.antialiased ? ", antialiased" : "")));
-  if (basis > kMostFieldBasis)
-    info(Concat("its colours are used up to degree ", DegreeOf(kMostFieldBasis)));
+  if (basis > kMaxBasis)
+    info(Concat("its colours are used up to degree ", DegreeOf(kMaxBasis)));
   if (scene.dropped > 0)
     info(Concat(scene.dropped, " splats cannot be drawn and are left out, the first is number ",
                 scene.first_dropped));

@@ -74,12 +74,12 @@ class Placement {
   Placement(const FieldRenderer& renderer, Stage stage, std::vector<SplatSample> samples)
       : renderer_(renderer), stage_(std::move(stage)), samples_(std::move(samples)) {}
 
-  // Three rings on which an object as large as this scene fits into its pictures.
+  // Two rings on which an object as large as this scene fits into its pictures.
   std::vector<Candidate> Rings(const ProgressFunction& progress) const {
     const Vec3d middle = Middle();
     std::vector<Vec3d> ways;
     for (const auto& [elevation, count, turn] :
-         {std::tuple{4.0, 14, 0.0}, std::tuple{22.0, 12, 0.5}, std::tuple{45.0, 10, 0.0}})
+         {std::tuple{6.0, 20, 0.0}, std::tuple{30.0, 16, 0.5}})
       for (int i = 0; i < count; ++i)
         ways.push_back(
             stage_.Way(2 * std::numbers::pi * (i + turn) / count, Radians(elevation)));
@@ -260,7 +260,7 @@ PlacedViews PlaceViews(const Splats& splats, const FieldRenderer& renderer, cons
                                                         : small.Resized(across, longest));
   }
   placed.summary = Format(
-      "%s: %zu views (three rings around it show %.0f %% of it well, the best views that it "
+      "%s: %zu views (two rings around it show %.0f %% of it well, the best views that it "
       "fills %.0f %%)",
       object ? "an object, seen from outside" : "a scene with surroundings, seen from within",
       chosen.size(), 100 * outside, 100 * filled);

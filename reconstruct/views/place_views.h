@@ -18,7 +18,7 @@ struct PlacedViews {
   std::string summary;          // "an object, seen from outside: 36 views ..."
 };
 
-// `renderer` draws `splats`, in whose world `up` is. If three rings around them, from which
+// `renderer` draws `splats`, in whose world `up` is. If two rings around them, from which
 // they fit into the picture, show clearly more of them well than the best views that they fill,
 // they are an object, and the rings are its views, without those that show holes. Else views
 // are chosen from some hundreds of candidates around and within the middle of the scene: those
