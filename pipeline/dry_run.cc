@@ -14,21 +14,27 @@
 #include "pipeline/run/fit_memory.h"
 #include "pipeline/run/paper_config.h"
 #include "pipeline/run/plan.h"
+#include "pipeline/stages/splat_views.h"
 #include "pipeline/stages/stages.h"
 #include "pipeline/workspace/folder_size.h"
 
 namespace regrade {
 namespace {
 
+constexpr double kReadSplatsSeconds = 5;  // and to measure them
+
 // One photo of the source stands for all; where it cannot be read, its size is a phone's.
 const CaptureSize& SizeOfSource(RunContext* context) {
   if (context->source_size) return *context->source_size;
-  const CaptureSource source = DetectCapture(context->source);
+  if (context->FromSplats() && !HasPhotosOfSplats(*context))
+    return context->source_size.emplace(SizeOfSplatViews(*context));
+  const CaptureSource source = context->Source();
   const InputFiles inputs = InputsOf(source);
   CaptureSize size;
   size.photos = ExpectedPhotos(inputs, context->settings.ingest);
   size.placed = source.kind != CaptureKind::kPhotos;
-  size.lacks_points = LacksPoints(source.kind) && context->settings.pose.tracks == "auto";
+  size.lacks_points = LacksPoints(source.kind) && context->settings.pose.tracks == "auto" &&
+                      !context->FromSplats();
   for (const InputFile& input : inputs.files) {
     if (input.kind != InputKind::kPhoto || !input.file.problem.empty()) continue;
     try {
@@ -82,6 +88,9 @@ std::vector<StageEstimate> ExpectedStages(RunContext* context) {
   std::vector<StageEstimate> stages = EstimateStages(
       settings, size, ChooseBackend(settings.run.device, settings.run.reproducible),
       omp_get_max_threads());
+  if (context->FromSplats())
+    for (StageEstimate& stage : stages)
+      if (stage.stage == "reconstruct") stage.seconds = kReadSplatsSeconds, stage.memory = 0;
   if (!posed) return stages;
   const double pace = MeasuredPace(stages, MeasuredStages(*context->workspace));
   for (StageEstimate& stage : stages) stage.seconds *= pace;
@@ -116,7 +125,7 @@ void PlanNewScene(const std::string& last, RunContext* context) {
   SayPaperConfig(context);
   context->console->Info("from " + PoseStage(context).plan);
   PlanStages("pose", last, "", context);
-  if (last == "pose") return;
+  if (last == "pose" || context->FromSplats()) return;
   const Backend backend = ChooseBackend(settings.run.device, settings.run.reproducible);
   const CaptureSize size = SizeOfSource(context);
   const std::string warning =

@@ -47,6 +47,7 @@ LAYERS = {
     "reconstruct/scene": 0,
     "reconstruct/colmap": 1,
     "reconstruct/fit": 1,
+    "reconstruct/views": 1,
     "reconstruct/refinement": 2,
     "reconstruct/splats": 2,
     "stylize": 0,

@@ -62,7 +62,7 @@ bool HasTestSplit(const Capture& capture) {
 std::vector<bool> HeldOutViews(const Capture& capture, int holdout) {
   const size_t views = capture.views.size();
   std::vector<bool> held_out(views, false);
-  if (holdout <= 0) return held_out;
+  if (holdout <= 0 || capture.rendered) return held_out;
   if (HasTestSplit(capture)) {
     for (size_t i = 0; i < views; ++i) held_out[i] = capture.views[i].test;
     return held_out;

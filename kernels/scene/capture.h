@@ -65,6 +65,7 @@ struct Capture {
   std::vector<PhotoStatus> statuses;
   double reprojection_px = 0;  // mean over observations, at the photos' size
   int models_found = 0;        // by COLMAP; 0 for poses from another source
+  bool rendered = false;       // there are no photos: the pictures are renders of the scene
 };
 
 // Whether the poses name photos for tests, and others.
@@ -74,7 +75,7 @@ bool HasTestSplit(const Capture& capture);
 // they are every `holdout`-th in order, starting with the first, where photos from one place
 // (twins: two files of one shot, a burst) count as one and are held out together, so that none
 // is fitted that shows what a held-out one does. A place that would leave less than half of the
-// photos, or less than two, is passed over. holdout 0 keeps none.
+// photos, or less than two, is passed over. holdout 0 keeps none, and of renders none is kept.
 std::vector<bool> HeldOutViews(const Capture& capture, int holdout);
 
 }  // namespace regrade

@@ -231,6 +231,7 @@ void WriteCaptureIndex(const std::string& folder, const Capture& capture,
                                       {"reprojection_px", capture.reprojection_px},
                                       {"nearest_depth", capture.nearest_depth},
                                       {"models_found", capture.models_found}};
+  if (capture.rendered) index["rendered"] = true;
   if (capture.box) {
     JsonValue::Array corners;
     for (const Vec3d& corner : {capture.box->low, capture.box->high})
@@ -273,6 +274,8 @@ Capture ReadCapture(const std::string& folder) {
     const std::set<std::string> test = TestPhotos(index, "file");
     for (CaptureView& view : capture.views) view.test = test.contains(view.file);
     capture.models_found = static_cast<int>(index.At("models_found").AsInt());
+    const JsonValue* const rendered = index.Find("rendered");
+    capture.rendered = rendered != nullptr && rendered->AsBool();
     return capture;
   } catch (const Error& error) {
     throw InputError(error.what_failed(), error.where().empty() ? path : error.where(),

@@ -4,9 +4,12 @@ namespace regrade {
 
 const std::vector<Command>& AllCommands() {
   static const std::vector<Command> commands = {
-      {"run", "PHOTOS|CAPTURE --style PICTURE [--style PICTURE ...] --out DIR [OPTIONS]",
-       "makes a styled 3D scene, films and a report from photos and a style picture", RunStages,
-       "out preset style name strength method masks photo-masks films film-seconds film-size "
+      {"run", "PHOTOS|CAPTURE|SPLATS --style PICTURE [--style PICTURE ...] --out DIR [OPTIONS]",
+       "makes a styled 3D scene, films and a report from photos, or from a file of splats, and "
+       "a style picture",
+       RunStages,
+       "out preset style name strength method masks photo-masks cameras films film-seconds "
+       "film-size "
        "device restart-from dry-run verbose"},
       {"pose", "PHOTOS --out DIR [OPTIONS]", "finds the camera pose of each photo", RunStages,
        "out photo-masks video-frames device restart-from dry-run verbose"},

@@ -11,6 +11,7 @@
 #include "pipeline/program/console.h"
 #include "pipeline/run/run_settings.h"
 #include "pipeline/run/stage_estimate.h"
+#include "pipeline/splat_files/read_splats.h"
 #include "pipeline/workspace/stage_runner.h"
 #include "pipeline/workspace/workspace.h"
 
@@ -35,9 +36,13 @@ struct RunContext {
   std::optional<CaptureSize> source_size = {};  // of the photos, once somebody asked for it
   std::vector<PlannedStage> planned = {};       // in a dry run
 
-  // What `source` is. Folders of masks in it hold no photos.
+  // Whether `source` is a file of splats, which is read in place of a fit.
+  bool FromSplats() const { return IsSplatFile(source); }
+  // What `source` is, or the capture that gives a file of splats its cameras. Folders of masks
+  // in it hold no photos.
   CaptureSource Source() const {
-    return DetectCapture(source, {settings.pose.photo_masks, settings.object.masks});
+    return DetectCapture(FromSplats() ? settings.splat_input.cameras : source,
+                         {settings.pose.photo_masks, settings.object.masks});
   }
   // Of the finished stage "pose", with the gains of "reconstruct"; cameras in the capture's
   // world.

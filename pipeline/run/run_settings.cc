@@ -18,6 +18,7 @@ void RunSettings::Bind(OptionSet* options) {
   options->Add("Photos", &ingest);
   options->Add("Poses", &pose);
   options->Add("Scene", &scene);
+  options->Add("Scene", &splat_input);
   options->Add("Fit", &fit);
   options->Add("Fit", &splats);
   options->Add("Style", &style);

@@ -49,6 +49,23 @@ struct SceneOptions {
   }
 };
 
+// What the program needs to know of a file of splats that is given in place of photos.
+struct SplatInput {
+  std::string cameras, up = "auto";
+
+  template <typename Bind>
+  void Describe(Bind& bind) {
+    bind("cameras", cameras,
+         {.help = "of a file of splats: a capture whose cameras are in its world: photos with "
+                  "poses, a COLMAP model, a folder of regrade, or a cameras.json. Without it "
+                  "views are placed by measurement"});
+    bind("up", up,
+         {.help = "of a file of splats without --cameras: the direction that is up in it; auto "
+                  "decides by the file's surfaces",
+          .choices = "auto|x|-x|y|-y|z|-z"});
+  }
+};
+
 struct StyleSource {
   std::vector<std::string> pictures;
   MatchChoice match;
@@ -155,6 +172,7 @@ struct RunSettings {
   IngestOptions ingest;
   PoseOptions pose;
   SceneOptions scene;
+  SplatInput splat_input;
   FitOptions fit;
   SplatFitOptions splats;
   StyleSource style;

@@ -1,5 +1,8 @@
 #include "pipeline/splat_files/read_splats.h"
 
+#include <algorithm>
+#include <cctype>
+#include <fstream>
 #include <string>
 #include <string_view>
 
@@ -26,6 +29,21 @@ constexpr OtherFormat kOthers[] = {
 };
 
 }  // namespace
+
+bool IsSplatFile(const std::filesystem::path& path) {
+  std::error_code none;
+  if (!std::filesystem::is_regular_file(path, none)) return false;
+  std::string ending = path.extension().string();
+  std::ranges::transform(ending, ending.begin(),
+                         [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  for (const char* known : {".ply", ".spz", ".splat", ".ksplat", ".sog"})
+    if (ending == known) return true;
+  std::ifstream file(path, std::ios::binary);
+  std::string begin(64, 0);
+  file.read(begin.data(), std::ssize(begin));
+  begin.resize(static_cast<size_t>(file.gcount()));
+  return LooksLikePly(begin) || LooksLikeSpz(begin);
+}
 
 SplatScene ReadSplats(const std::filesystem::path& path, uint64_t budget) {
   const std::string where = path.string(), bytes = ReadWholeFile(where, budget);

@@ -8,6 +8,10 @@
 
 namespace regrade {
 
+// Whether a file is for ReadSplats: one that begins as such a format does, or whose name ends
+// as those of splats do, so that ReadSplats says what is wrong with it.
+bool IsSplatFile(const std::filesystem::path& path);
+
 // Tells by its content which format the file has, whatever its name: a PLY of Gaussians
 // (gaussian_ply.h), PlayCanvas' compressed PLY (compressed_ply.h), Niantic's SPZ (spz.h) or
 // .splat (dot_splat.h).

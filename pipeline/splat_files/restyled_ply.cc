@@ -33,6 +33,18 @@ std::vector<Coefficient> InOrderOfTheFile(const GaussianLayout& layout) {
 
 }  // namespace
 
+bool IsGaussianPly(const std::filesystem::path& path) {
+  const std::string bytes = ReadWholeFile(path.string(), UINT64_MAX);
+  if (!LooksLikePly(bytes)) return false;
+  const PlyHeader header = ParsePlyHeader(bytes, path.string());
+  if (IsCompressedPly(header)) return false;
+  const GaussianLayout layout = FindGaussians(header, path.string());
+  const PlyElement& element = header.elements[layout.vertex];
+  return std::ranges::none_of(InOrderOfTheFile(layout), [&](const Coefficient& c) {
+    return IsInteger(element.properties[c.property].type);
+  });
+}
+
 void WriteRestyled(const std::filesystem::path& path_in, const std::filesystem::path& path_out,
                    std::span<const float> sh, int basis, const std::string& comment) {
   const std::string where = path_in.string();

@@ -7,6 +7,9 @@
 
 namespace regrade {
 
+// Whether a file is one that WriteRestyled copies. Throws Error(kInput) as ReadSplats.
+bool IsGaussianPly(const std::filesystem::path& path);
+
 // Copies `path_in`, a PLY of Gaussians that ReadSplats has read, to `path_out` (atomically, it
 // may be the same) with other numbers in f_dc_* and f_rest_*, and one more comment, a line of
 // the header. All other bytes and the order of the vertices stay.

@@ -14,9 +14,13 @@
 #include "pipeline/capture/pose_tracks.h"
 #include "pipeline/capture/scene_profile.h"
 #include "pipeline/files/text.h"
+#include "pipeline/program/device_choice.h"
 #include "pipeline/report/stage_metrics.h"
 #include "pipeline/run/plan.h"
 #include "pipeline/run/run_context.h"
+#include "pipeline/stages/foreign_splats.h"
+#include "pipeline/stages/splat_points.h"
+#include "pipeline/stages/splat_views.h"
 #include "pipeline/stages/stages.h"
 #include "pipeline/workspace/metrics_json.h"
 #include "reconstruct/colmap/photo_statuses.h"
@@ -171,16 +175,24 @@ StageOutcome FindPoses(RunContext* context, const CaptureSource& source,
     metrics.lens = report.lens;
   }
   PoseTracks tracks;
-  if (source.kind != CaptureKind::kPhotos)
+  if (context->FromSplats()) {
+    const RadianceField field = FieldInItsWorld(ReadForeignSplats(*context, true));
+    const FieldRenderer renderer(field,
+                                 ChooseBackend(settings.run.device, settings.run.reproducible));
+    AddSplatPoints(field, renderer, sparse_folder, source.poses, &capture);
+  } else if (source.kind != CaptureKind::kPhotos)
     tracks = AddTracks(options, settings.run.effects, sparse_folder, colmap_photos,
                        workspace.Path(".regrade/work/pose/tracks"), &capture,
                        parts.Next(seconds.tracks));
   if (!tracks.note.empty()) context->console->Info(tracks.note);
   if (!tracks.metrics.IsNull()) outcome.metrics["tracks"] = tracks.metrics;
   for (CaptureView& view : capture.views) view.path = photo_folder + "/" + view.name;
-  const PoseProfile profile = ProfilePoses(source.kind, settings.pose, settings.run.effects,
-                                           sparse_folder, ingest.photos, tracks.misfit_scale,
-                                           &capture, parts.Next(seconds.refinement));
+  // Splats lie in the world of the poses as they are.
+  const std::string effects =
+      settings.run.effects + (context->FromSplats() ? ",pose-refinement=off" : "");
+  const PoseProfile profile =
+      ProfilePoses(source.kind, settings.pose, effects, sparse_folder, ingest.photos,
+                   tracks.misfit_scale, &capture, parts.Next(seconds.refinement));
   context->console->Detail(EffectLine(profile.effect));
   outcome.metrics["effects"] = EffectsRecord({profile.effect});
   if (!profile.metrics.IsNull()) outcome.metrics["pose_refinement"] = profile.metrics;
@@ -202,6 +214,7 @@ StageOutcome FindPoses(RunContext* context, const CaptureSource& source,
 }  // namespace
 
 Stage PoseStage(RunContext* context) {
+  if (context->FromSplats() && !HasPhotosOfSplats(*context)) return SplatViewsStage(context);
   const CaptureSource source = context->Source();
   Stage stage;
   stage.name = "pose";
@@ -233,6 +246,7 @@ Stage PoseStage(RunContext* context) {
   else
     for (const auto& [photo, mask] : source.masks)
       stage.inputs["photo_masks"][photo] = HashFile(mask);
+  if (context->FromSplats()) stage.inputs["splats"] = HashFile(context->source);
   stage.refuse_changes = true;
   const InputFiles inputs = InputsOf(source);
   stage.plan =

@@ -1,11 +1,9 @@
 // Stage "reconstruct": fits field.npz to the capture, and measures it on held-out photos.
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <string>
 
 #include "kernels/base/error.h"
-#include "kernels/image/detail_kept.h"
 #include "pipeline/capture/capture_store.h"
 #include "pipeline/capture/scene_profile.h"
 #include "pipeline/capture/working_views.h"
@@ -19,7 +17,8 @@
 #include "pipeline/run/paper_traits.h"
 #include "pipeline/run/run_context.h"
 #include "pipeline/stages/field_fit.h"
-#include "pipeline/stages/photo_metrics.h"
+#include "pipeline/stages/fit_quality.h"
+#include "pipeline/stages/given_field.h"
 #include "pipeline/stages/stages.h"
 #include "pipeline/workspace/folder_size.h"
 #include "pipeline/workspace/metrics_json.h"
@@ -30,42 +29,6 @@ namespace {
 constexpr double kAfterFit =
     0.08;  // pruning, writing and measuring, as a fraction of the steps' time
 constexpr double kTrial = 0.08;  // the trial of degrees, likewise
-
-void SetPhotoMetrics(const PhotoMetrics& held_out, const PhotoMetrics& train,
-                     ReconstructReport* metrics) {
-  const auto metric = [](const PhotoMetrics& of, std::vector<double> PhotoMetrics::*values,
-                         const char* why = "") {
-    return Metric(MeanOf(of.*values), of.files.empty() ? "no photo was held out" : why);
-  };
-  const char* flat = "the photos have no fine detail";
-  metrics->heldout = held_out.files;
-  metrics->psnr_heldout_db = metric(held_out, &PhotoMetrics::psnr);
-  metrics->ssim_heldout = metric(held_out, &PhotoMetrics::ssim);
-  metrics->detail_kept_heldout = metric(held_out, &PhotoMetrics::detail_kept, flat);
-  metrics->detail_error_heldout = metric(held_out, &PhotoMetrics::detail_error);
-  metrics->ssim_train = metric(train, &PhotoMetrics::ssim);
-  metrics->detail_kept_train = metric(train, &PhotoMetrics::detail_kept, flat);
-  metrics->detail_error_train = metric(train, &PhotoMetrics::detail_error);
-  const auto& kept = metrics->detail_kept_heldout.value ? metrics->detail_kept_heldout.value
-                                                        : metrics->detail_kept_train.value;
-  if (kept) metrics->sharpness = SharpnessWord(*kept);
-}
-
-// "reconstruction: slightly soft, detail kept 0.62; 27.51 dB, SSIM 0.812 on held-out photos"
-std::string QualityLine(const ReconstructReport& metrics) {
-  const auto number = [](const Metric& metric, const char* format) {
-    char text[32] = "-";
-    if (metric.value) std::snprintf(text, sizeof text, format, *metric.value);
-    return std::string(text);
-  };
-  const bool held_out = !metrics.heldout.empty();
-  return "reconstruction: " + (metrics.sharpness.empty() ? "" : metrics.sharpness + ", ") +
-         "detail kept " +
-         number(held_out ? metrics.detail_kept_heldout : metrics.detail_kept_train, "%.2f") +
-         "; " + number(held_out ? metrics.psnr_heldout_db : metrics.psnr_train_db, "%.2f") +
-         " dB, SSIM " + number(held_out ? metrics.ssim_heldout : metrics.ssim_train, "%.3f") +
-         (held_out ? " on held-out photos" : " on training photos");
-}
 
 int64_t PixelsToFit(const WorkingViews& views) {
   int64_t pixels = 0;
@@ -215,17 +178,7 @@ StageOutcome Reconstruct(RunContext* context, const JsonValue& inputs,
   metrics.rejected_voxels = fitted.rejected;
   metrics.psnr_at_steps = std::move(fitted.psnr_at_steps);
   const StoredField stored = ReadFieldFile(workspace.Path("field.npz"));
-  SetPhotoMetrics(MeasureOnPhotos(views, views.HeldOut(), stored, backend),
-                  MeasureOnPhotos(views, MeasuredTrainingViews(views), stored, backend),
-                  &metrics);
-  if (const Metric& kept =
-          metrics.heldout.empty() ? metrics.detail_kept_train : metrics.detail_kept_heldout;
-      kept.value)
-    context->console->Info(
-        Format("the scene shows %.0f %% of the fine detail of %s: %s", 100 * *kept.value,
-               metrics.heldout.empty() ? "the photos" : "photos that were kept out of the fit",
-               metrics.sharpness.c_str()));
-  context->console->Detail(QualityLine(metrics));
+  MeasureFit(views, stored, backend, false, context->console, &metrics);
   PutMetrics(metrics, &outcome.metrics);
   return outcome;
 }
@@ -245,6 +198,7 @@ void ChoosePaperSettings(RunContext* context) {
 }  // namespace
 
 Stage ReconstructStage(RunContext* context) {
+  if (context->FromSplats()) return GivenFieldStage(context);
   ChoosePaperSettings(context);
   const RunOptions& run = context->settings.run;
   Stage stage;

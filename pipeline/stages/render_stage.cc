@@ -28,6 +28,7 @@
 #include "pipeline/stages/seen_by_few_recorder.h"
 #include "pipeline/stages/stages.h"
 #include "pipeline/stages/styled_field.h"
+#include "pipeline/stages/styled_splats.h"
 #include "pipeline/stages/videos.h"
 #include "pipeline/workspace/metrics_json.h"
 #include "pipeline/workspace/output_names.h"
@@ -111,16 +112,21 @@ double WorkOf(const FrameSet& set) {
 }
 
 // The renderers of the scene's field and of the style's. Fields have gigabytes: neither stays.
-void PrepareFields(const RunSettings& settings, const Workspace& style, Backend backend,
-                   StoredField before, FrameRenderers* renderers) {
+void PrepareFields(const RunContext& context, Backend backend, StoredField before,
+                   FrameRenderers* renderers, std::vector<std::string>* outputs) {
+  const RunSettings& settings = context.settings;
+  const Workspace& style = *context.style;
   renderers->source.emplace(before.field, backend);
   const StoredField after =
       StyledFieldOf(std::move(before), style.folder(), settings.style.strength);
   const std::string kept = style.Path("styled.npz");
-  if (settings.style.keep_field)
+  if (settings.style.keep_field) {
     WriteFieldFile(kept, after);
-  else
+    outputs->push_back("styled.npz");
+  } else {
     std::filesystem::remove(kept);  // of an earlier style
+  }
+  if (WriteStyledSplats(context, after)) outputs->push_back(kStyledSplats);
   renderers->styled.emplace(after.field, backend);
 }
 
@@ -139,7 +145,9 @@ StageOutcome Render(RunContext* context, const ProgressFunction& progress) {
         before.field,
         ReadObjectFile(workspace.Path("object.npz"), before.field.geometry->num_voxels()));
   const Backend backend = ChooseBackend(settings.run.device, settings.run.reproducible);
-  PrepareFields(settings, workspace, backend, std::move(before), &renderers);
+  StageOutcome outcome;
+  outcome.outputs = {"frames"};
+  PrepareFields(*context, backend, std::move(before), &renderers, &outcome.outputs);
   renderers.stylizer = MakeSceneStylizer(context, views, masks.get(),
                                          [&](const Image&, int) { return renderers.coverage; });
   renderers.edit.emplace(settings.residual, views, *renderers.source);
@@ -180,9 +188,6 @@ StageOutcome Render(RunContext* context, const ProgressFunction& progress) {
   if (!has_film)  // films of an earlier start
     for (const char* name : {kStyledFilm, kWipeFilm, kViews2dFilm})
       std::filesystem::remove(workspace.Path(name));
-  StageOutcome outcome;
-  outcome.outputs = {"frames"};
-  if (settings.style.keep_field) outcome.outputs.push_back("styled.npz");
   RunFilms films(workspace, settings.render.fps, film_frames,
                  film_of_views ? settings.render.fps : kSampleRate);
   {

@@ -38,12 +38,12 @@ inline constexpr char kRetouchedFolder[] = "retouched";
 // What is at the top of the output folder and of a style's, besides `styles`: files and whole
 // folders of our own.
 inline constexpr const char* kOwnNames[] = {
-    ".regrade",        "run.json",   "poses",        "field.npz",   "field_2d.npz",
-    "network.npz",     "object.npz", "residual.npz", "styled.npz",  "views_2d",
-    "frames",          "heatmaps",   "stills",       "layers",      kRetouchedFolder,
-    "retouch",         "edit.cube",  "retouch.json", "report.json", "report.html",
-    kScenePage,        kFilmsFolder, kStyledFilm,    kWipeFilm,     kViews2dFilm,
-    "styles/.pictures"};
+    ".regrade",       "run.json",        "poses",        "field.npz",    "field_2d.npz",
+    "network.npz",    "object.npz",      "residual.npz", "styled.npz",   "styled.ply",
+    "views_2d",       "frames",          "heatmaps",     "stills",       "layers",
+    kRetouchedFolder, "retouch",         "edit.cube",    "retouch.json", "report.json",
+    "report.html",    kScenePage,        kFilmsFolder,   kStyledFilm,    kWipeFilm,
+    kViews2dFilm,     "styles/.pictures"};
 
 // "00007.png"
 inline std::string FrameName(int index) { return Format("%05d.png", index); }

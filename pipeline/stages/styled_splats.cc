@@ -1,0 +1,55 @@
+#include "pipeline/stages/styled_splats.h"
+
+#include <filesystem>
+#include <span>
+#include <vector>
+
+#include "kernels/base/error.h"
+#include "pipeline/fields/network_file.h"
+#include "pipeline/splat_files/placed_splats.h"
+#include "pipeline/splat_files/restyled_ply.h"
+#include "pipeline/splat_files/splat_ply.h"
+
+namespace regrade {
+namespace {
+
+std::string CommentOf(const RunContext& context) {
+  const StyleSource& style = context.settings.style;
+  const StoredNetwork network = ReadNetworkFile(context.style->Path("network.npz"));
+  std::string comment =
+      "restyled by regrade " REGRADE_VERSION ": style " + style.name +
+      Format(", Lipschitz bound of the colours %.3f", network.network.Bound());
+  if (style.strength != 1) comment += Format(", strength %.3g", style.strength);
+  return comment;
+}
+
+// Whether the given file is still there, unchanged, and in a format that is written back.
+bool CanCopy(const RunContext& context, const std::string& hash) {
+  std::error_code none;
+  if (!std::filesystem::is_regular_file(context.source, none)) return false;
+  return IsGaussianPly(context.source) && HashFile(context.source) == hash;
+}
+
+}  // namespace
+
+bool WriteStyledSplats(const RunContext& context, const StoredField& styled) {
+  const std::string path = context.style->Path(kStyledSplats);
+  const auto record = context.workspace->Find("reconstruct");
+  const JsonValue* const hash = record ? record->inputs.Find("splats") : nullptr;
+  if (hash == nullptr) {
+    std::filesystem::remove(path);
+    return false;
+  }
+  const Appearance& colors = styled.field.appearance;
+  if (CanCopy(context, hash->AsString()))
+    WriteRestyled(context.source, path,
+                  ColorsBeforeMove(styled.field_from_world,
+                                   {colors.sh.data(), static_cast<size_t>(colors.sh.size())},
+                                   colors.basis),
+                  colors.basis, CommentOf(context));
+  else
+    WriteSplatPly(path, styled, CommentOf(context));
+  return true;
+}
+
+}  // namespace regrade

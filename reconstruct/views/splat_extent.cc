@@ -1,0 +1,47 @@
+#include "reconstruct/views/splat_extent.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+#include <vector>
+
+namespace regrade {
+namespace {
+
+// The value below which the part `q` of the weight lies.
+double WeightedQuantile(std::vector<std::pair<double, double>> values, double q) {
+  std::ranges::sort(values);
+  double total = 0, sum = 0;
+  for (const auto& [value, weight] : values) total += weight;
+  for (const auto& [value, weight] : values)
+    if ((sum += weight) >= q * total) return value;
+  return values.empty() ? 0 : values.back().first;
+}
+
+}  // namespace
+
+SplatExtent ExtentOf(const Splats& splats) {
+  SplatExtent extent;
+  const SplatsView<float> view = splats.view();
+  std::vector<std::pair<double, double>> values(static_cast<size_t>(view.count));
+  const auto weight = [&view](int64_t i) {
+    return 1 / (1 + std::exp(-double{view.opacity_logit[i]}));
+  };
+  for (int a = 0; a < 3; ++a) {
+    for (int64_t i = 0; i < view.count; ++i)
+      values[static_cast<size_t>(i)] = {view.mean[3 * i + a], weight(i)};
+    extent.center[a] = WeightedQuantile(values, 0.5);
+  }
+  for (int64_t i = 0; i < view.count; ++i)
+    values[static_cast<size_t>(i)] = {Norm(view[i].mean.Cast<double>() - extent.center),
+                                      weight(i)};
+  extent.radius = WeightedQuantile(values, 0.9);
+  extent.inner = WeightedQuantile(values, 0.5);
+  extent.outer = WeightedQuantile(values, 0.98);
+  if (!(extent.radius > 0)) extent.radius = 1;
+  if (!(extent.outer > 0)) extent.outer = extent.radius;
+  if (!(extent.inner > 0)) extent.inner = extent.radius;
+  return extent;
+}
+
+}  // namespace regrade
