@@ -135,6 +135,29 @@ class Placement {
     return around;
   }
 
+  // Places beside each of these, which look at the middle, or on as they do near to it.
+  std::vector<Candidate> Beside(const std::vector<Candidate>& views,
+                                const ProgressFunction& progress) const {
+    constexpr double kStep = 0.22;  // of the distance to the middle
+    std::vector<Candidate> beside;
+    for (const Candidate& view : views) {
+      ReportOrThrow(progress, static_cast<double>(beside.size()),
+                    6.0 * static_cast<double>(views.size()));
+      const Vec3d from = view.camera.Center(), to = stage_.extent.center - from;
+      const bool looks_at_it = Dot(Normalized(to), view.camera.Forward()) > kSameWay;
+      const double step = kStep * std::max(Norm(to), 0.5 * stage_.extent.inner);
+      const Mat3d& axes = view.camera.camera_from_world.rotation;
+      for (const Vec3d& axis : axes.row)
+        for (const double side : {-step, step}) {
+          const Vec3d place = from + axis * side;
+          beside.push_back(
+              Probe(place, looks_at_it ? stage_.extent.center - place : view.camera.Forward(),
+                    false));
+        }
+    }
+    return beside;
+  }
+
   // The candidates that show most together; each counts less what others show already.
   std::vector<Candidate> Choose(std::vector<Candidate> all) const {
     double best = 0;
@@ -240,15 +263,18 @@ PlacedViews PlaceViews(const Splats& splats, const FieldRenderer& renderer, cons
                        int longest, const std::string& where,
                        const ProgressFunction& progress) {
   const Placement placement(renderer, StageOf(splats, up), SampleSplats(splats, kSamples));
-  ProgressParts parts(progress, 4);
+  ProgressParts parts(progress, 5);
   const std::vector<Candidate> rings = placement.Rings(parts.Next(0.5));
   std::vector<Candidate> all = placement.Within(parts.Next(1));
   std::ranges::move(placement.Around(parts.Next(2.5)), std::back_inserter(all));
   const double outside = ShownBy(rings, [](const Candidate&c) { return c.probe.Quality(); }),
                filled = ShownBy(all, [](const Candidate&c) { return c.filled; });
   const bool object = outside > kObjectShowsMore * filled;
-  const std::vector<Candidate> chosen =
-      object ? WithoutHoles(rings) : placement.Choose(std::move(all));
+  std::vector<Candidate> chosen = object ? WithoutHoles(rings) : placement.Choose(all);
+  if (!object && chosen.size() < kMostPlacedViews) {  // good places are few: look beside them
+    std::ranges::move(placement.Beside(chosen, parts.Next(1)), std::back_inserter(all));
+    chosen = placement.Choose(std::move(all));
+  }
   if (chosen.size() < 2 || !(std::max(outside, filled) > 0))
     throw InputError("no place shows the splats without holes", where,
                      "give the cameras of its photos: --cameras");

@@ -21,10 +21,10 @@ struct PlacedViews {
 // `renderer` draws `splats`, in whose world `up` is. If two rings around them, from which
 // they fit into the picture, show clearly more of them well than the best views that they fill,
 // they are an object, and the rings are its views, without those that show holes. Else views
-// are chosen from some hundreds of candidates around and within the middle of the scene: those
-// that show much of it, filled and without holes, each adding to what the ones before show. The
-// same splats give the same views. Throws Error(kInput) with `where` if no place shows
-// anything, Interrupted.
+// are chosen from some hundreds of candidates around and within the middle of the scene, and
+// beside the best of these: those that show much of it, filled and without holes, each adding
+// to what the ones before show. The same splats give the same views. Throws Error(kInput) with
+// `where` if no place shows anything, Interrupted.
 PlacedViews PlaceViews(const Splats& splats, const FieldRenderer& renderer, const Vec3d& up,
                        int longest, const std::string& where, const ProgressFunction& progress);
 
