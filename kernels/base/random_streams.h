@@ -12,6 +12,7 @@ inline constexpr uint64_t kRandomFreeSpace = 0x66726565;      // rays of EQ(free
 inline constexpr uint64_t kRandomSplatNoise = 0x73706c;       // of EQ(splat-noise)
 inline constexpr uint64_t kRandomSplatSource = 0x736f75;      // which splats are copied
 inline constexpr uint64_t kRandomSplatViews = 0x766965;       // the order of photos in a fit
+inline constexpr uint64_t kRandomSplatDropout = 0x64726f;     // of EQ(splat-dropout)
 inline constexpr uint64_t kRandomSplatPlaces = 0x706c61;      // initial splats without a point
 inline constexpr uint64_t kRandomSynthNoise = 0x5e4507;  // sensor noise of synthetic photos
 inline constexpr uint64_t kRandomSynthModel = 0x7a11;    // errors of synthetic poses, points

@@ -24,15 +24,15 @@ struct SeenSplat {
 template <typename T>
 HD bool SeeSplat(const SplatCamera& camera, const SplatOptions& options,
                  const SplatsView<T>& splats, int64_t i, SeenSplat<T>* seen) {
-  if (!IsUsable(splats, i)) return false;
+  if (!IsUsable(splats, i) || options.dropout.Drops(i)) return false;
   const Splat<T> splat = splats[i];
   SplatProjection<T> projection;
   if (!ProjectSplat(camera, options, splat, &projection)) return false;
   seen->index = static_cast<int32_t>(i);
   seen->z = static_cast<T>(projection.at.z);
   seen->ellipse = projection.ellipse;
-  if (!SplatReach(splat.opacity_logit, projection.ellipse.filter, &seen->log_opacity,
-                  &seen->reach))
+  if (!SplatReach(splat.opacity_logit, projection.ellipse.filter * T(options.dropout.gain),
+                  &seen->log_opacity, &seen->reach))
     return false;
   seen->color = SplatColor(splats.basis, splats.Coefficients(i),
                            DirectionToMean(camera.center, splat.mean).unit);

@@ -41,7 +41,7 @@ struct PlannedSplatFit {
 
 // The same of splats: first at most one for each kPixelsOfSplat pixels of the photos; with
 // more, few photos are explained one by one, and views between them get worse.
-inline constexpr int kPixelsOfSplat = 30;
+inline constexpr int kPixelsOfSplat = 15;
 PlannedSplatFit SplatsWithinMemory(SplatFitOptions options, const FitPlace& place);
 
 // The plan of the field that the settings ask for, whatever its kind, before it is lowered.

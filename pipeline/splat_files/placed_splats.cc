@@ -8,16 +8,6 @@
 
 namespace regrade {
 
-void LowerBasis(int basis, Splats* splats) {
-  if (splats->basis <= basis) return;
-  const auto from = static_cast<size_t>(splats->basis), to = static_cast<size_t>(basis);
-  for (size_t channel = 0; channel < splats->sh.size() / from; ++channel)
-    std::copy_n(splats->sh.begin() + static_cast<long>(channel * from), to,
-                splats->sh.begin() + static_cast<long>(channel * to));
-  splats->sh.resize(splats->sh.size() / from * to);
-  splats->basis = basis;
-}
-
 void MoveSplats(const Similarity& target_from_source, Splats* splats) {
   const SplatTurn turn(target_from_source.rotation);
   const auto log_scale = static_cast<float>(std::log(target_from_source.scale));

@@ -10,9 +10,6 @@
 
 namespace regrade {
 
-// Leaves out the harmonics from `basis` on.
-void LowerBasis(int basis, Splats* splats);
-
 // The same scene in another frame.
 void MoveSplats(const Similarity& target_from_source, Splats* splats);
 

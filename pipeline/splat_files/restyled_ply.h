@@ -15,8 +15,8 @@ bool IsGaussianPly(const std::filesystem::path& path);
 // the header. All other bytes and the order of the vertices stay.
 //
 // `sh` [N, 3, basis]: of the N splats of ReadSplats, in their order and frame, all coefficients
-// of red first. `basis` is at most that of the file, 1, 4, 9 or 16; coefficients of higher
-// degrees become 0. The splats that ReadSplats dropped keep their bytes.
+// of red first. Coefficients of degrees that the file does not have are left out; where it has
+// more, they become 0. The splats that ReadSplats dropped keep their bytes.
 //
 // Throws Error(kUsage) for another format or colours of an integer type, Error(kInput) as
 // ReadSplats and if the file no longer has N such splats, Error(kResources) as AtomicFile.

@@ -39,15 +39,12 @@ SplatScene ReadForeignSplats(const RunContext& context, bool say) {
       PlannedMemory(context.settings.run.max_memory_gb, ReadMemoryStatus().available);
   SplatScene scene =
       memory > 0 ? ReadSplats(context.source, memory) : ReadSplats(context.source);
-  const int basis = scene.splats.basis;
-  LowerBasis(kMaxBasis, &scene.splats);
   if (!say) return scene;
   const std::string name = std::filesystem::path(context.source).filename().string();
   const auto info = [&](const std::string& text) { context.console->Info(name + ": " + text); };
-  info(Concat(scene.splats.count(), " splats with colours of degree ", DegreeOf(basis), ", ",
-              NameOf(scene.format), (scene.antialiased ? ", antialiased" : "")));
-  if (basis > kMaxBasis)
-    info(Concat("its colours are used up to degree ", DegreeOf(kMaxBasis)));
+  info(Concat(scene.splats.count(), " splats with colours of degree ",
+              DegreeOf(scene.splats.basis), ", ", NameOf(scene.format),
+              (scene.antialiased ? ", antialiased" : "")));
   if (scene.dropped > 0)
     info(Concat(scene.dropped, " splats cannot be drawn and are left out, the first is number ",
                 scene.first_dropped));

@@ -9,7 +9,7 @@
 
 namespace regrade {
 
-// Reads the run's file, with at most kMaxBasis harmonics, within --max-memory. `say`: for
+// Reads the run's file, within --max-memory. `say`: for
 // the console, once a run. Throws Error(kInput) as ReadSplats.
 SplatScene ReadForeignSplats(const RunContext& context, bool say);
 

@@ -129,6 +129,9 @@ class SplatFitter {
                     options_.rate_color,
                     options_.rate_view};
     update.noise = options_.noise * rate;
+    if (options_.steps >= options_.dropout_from)
+      step.dropout =
+          SplatDropout(options_.dropout * part, options_.seed, static_cast<uint64_t>(step_));
     const float splats = static_cast<float>(engine_->count());
     update.opacity_weight = options_.opacity_weight / splats;
     update.scale_weight = options_.scale_weight / (3 * splats);

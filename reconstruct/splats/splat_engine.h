@@ -19,6 +19,7 @@ namespace regrade {
 struct SplatStep {
   int photo = 0;
   float ssim_weight = 0;
+  SplatDropout dropout;
   SplatUpdate update;
 };
 

@@ -34,10 +34,12 @@ class CpuSplatEngine : public SplatEngine {
 
   void Step(const SplatStep& step) override {
     const SplatPhoto& photo = (*photos_)[step.photo];
+    SplatOptions options = options_;
+    options.dropout = step.dropout;
     const int width = photo.camera.width, height = photo.camera.height;
     if (picture_.width != width || picture_.height != height)
       picture_ = d_picture_ = SplatPicture<float>(width, height);
-    MakeSplatFrame(state_.splats.view(), photo.camera, options_, &frame_);
+    MakeSplatFrame(state_.splats.view(), photo.camera, options, &frame_);
     RenderSplats(frame_, &picture_);
     const PictureSums sums = Compare(
         width, height, photo.color.data(), photo.masked.empty() ? nullptr : photo.masked.data(),

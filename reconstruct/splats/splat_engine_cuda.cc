@@ -78,7 +78,9 @@ class CudaSplatEngine : public SplatEngine {
   void Step(const SplatStep& step) override {
     const Camera& camera = (*photos_)[step.photo].camera;
     const DevicePhoto& photo = on_device_[static_cast<size_t>(step.photo)];
-    renderer_.Render(splats_.value.view(), camera, options_, SplatPass::kColorAdjoint);
+    SplatOptions options = options_;
+    options.dropout = step.dropout;
+    renderer_.Render(splats_.value.view(), camera, options, SplatPass::kColorAdjoint);
     loss_.Compare(camera.width, camera.height, photo.color.data(), photo.masked.data(),
                   renderer_.pixels().color, step.ssim_weight, d_picture_.data());
     SplatPixels<const float> d{};

@@ -28,6 +28,10 @@ struct SplatFitOptions {
   float growth = 0.05f;  // of the splats, each time
   float degree_each = 1.0f / 30;
   float small_until = 0.3f;  // at half the photos' size
+  // The share of EQ(splat-dropout) rises to this, in fits of so many steps or more: shorter
+  // ones have not begun to learn their photos by heart.
+  float dropout = 0.1f;
+  int dropout_from = 4000;
   bool antialiased = false;
   uint64_t seed = 0;
 

@@ -42,16 +42,17 @@ double Loss(const SplatArrays<double>& splats, const Camera& camera,
   return sum;
 }
 
-class SplatGradient : public ::testing::TestWithParam<std::tuple<int, bool>> {};
+class SplatGradient : public ::testing::TestWithParam<std::tuple<int, bool, float>> {};
 
 // Every value of random scenes, with splats in front of each other, at the edges and beyond the
 // limits of the slope. Jumps at alpha = 1 / 255 and where a pixel ends, and kinks at 0.99 and
 // at black, show as derivatives of two steps that disagree, and are left out.
 TEST_P(SplatGradient, AdjointEqualsDerivativeInDouble) {
-  const auto [basis, antialiased] = GetParam();
+  const auto [basis, antialiased, dropout] = GetParam();
   const Camera camera = SplatCameraOf(13, 10);
   SplatOptions options;
   options.antialiased = antialiased;
+  options.dropout = SplatDropout(dropout, 3, 4);
   const SplatPicture<double> d = RandomAdjoint<double>(camera);
   int checked = 0, not_zero = 0, all = 0, limited = 0;
   for (const auto& [seed, spread] : {std::pair{31u, 1.2}, {32u, 2.6}}) {
@@ -88,12 +89,13 @@ TEST_P(SplatGradient, AdjointEqualsDerivativeInDouble) {
     for (int c = 0; c < 3; ++c) check(&splats.background[c], gradient.background[c]);
   }
   EXPECT_GT(checked, 0.8 * all);
-  EXPECT_GT(not_zero, 0.7 * all);
+  EXPECT_GT(not_zero, (dropout > 0 ? 0.4 : 0.7) * all);
   EXPECT_GT(limited, 0);
 }
 
 INSTANTIATE_TEST_SUITE_P(Degrees, SplatGradient,
-                         ::testing::Combine(::testing::Values(1, 4, 9, 16), ::testing::Bool()));
+                         ::testing::Combine(::testing::Values(1, 4, 9, 16), ::testing::Bool(),
+                                            ::testing::Values(0.0f, 0.3f)));
 
 // One splat in the middle of the picture.
 SplatArrays<double> OneSplat(double logit, double scale) {
@@ -118,6 +120,37 @@ TEST(SplatLimits, AboveTheGreatestAlphaOnlyTheColourHasAGradient) {
   const SplatArrays<double> below = OneSplat(4, 300);
   EXPECT_NE(RenderSplatsPlainAdjoint(below.view(), camera, SplatOptions(), d).opacity_logit[0],
             0);
+}
+
+TEST(SplatDropout, LeavesOutItsShareAndRaisesTheOthersOpacities) {
+  const Camera camera = SplatCameraOf(13, 10);
+  const SplatArrays<double> splats = RandomSplats(4000, 1, 7, 1.0, 0.15);
+  const SplatOptions all;
+  const std::vector<SeenSplat<double>> seen = SeeSplats(splats.view(), camera, all);
+  std::vector<double> log_opacity(4000, 1);
+  for (const SeenSplat<double>& splat : seen)
+    log_opacity[static_cast<size_t>(splat.index)] = splat.log_opacity;
+  std::vector<int> times(4000);
+  for (const uint64_t step : {1u, 2u}) {
+    SplatOptions some;
+    some.dropout = SplatDropout(0.25f, 3, step);
+    for (const SeenSplat<double>& splat : SeeSplats(splats.view(), camera, some)) {
+      const size_t i = static_cast<size_t>(splat.index);
+      ++times[i];
+      if (log_opacity[i] <= 0)  // it is also seen without a share, where it is less opaque
+        EXPECT_NEAR(splat.log_opacity - log_opacity[i], std::log(4.0 / 3), 1e-6);
+    }
+  }
+  int once = 0, twice = 0;
+  for (const SeenSplat<double>& splat : seen) {
+    once += times[static_cast<size_t>(splat.index)] == 1;
+    twice += times[static_cast<size_t>(splat.index)] == 2;
+  }
+  // Of n independent draws, within five standard errors.
+  const double n = static_cast<double>(seen.size());
+  EXPECT_GT(n, 1000);
+  EXPECT_NEAR(once / n, 2 * 0.25 * 0.75, 5 * std::sqrt(0.24 / n));
+  EXPECT_NEAR(twice / n, 0.75 * 0.75, 5 * std::sqrt(0.25 / n));
 }
 
 TEST(SplatLimits, ABlackChannelHasNoGradient) {

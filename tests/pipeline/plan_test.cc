@@ -123,11 +123,11 @@ TEST(Plan, SplatsAreLoweredToMemory) {
   EXPECT_NE(lowered.notice, "");
 }
 
-// A splat for each 30 pixels is enough.
+// A splat for each 15 pixels is enough.
 TEST(Plan, FewPixelsHaveFewSplats) {
   SplatFitOptions asked;
   asked.thousands = 100;
-  EXPECT_EQ(SplatsWithinMemory(asked, {.pixels = 600000, .photos = 4}).options.thousands, 20);
+  EXPECT_EQ(SplatsWithinMemory(asked, {.pixels = 600000, .photos = 4}).options.thousands, 40);
 }
 
 TEST(Plan, DeviceMemoryByHand) {

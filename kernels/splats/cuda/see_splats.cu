@@ -20,12 +20,13 @@ __device__ int SeeShape(const SplatsView<float>& splats, const SplatCamera& came
                         SplatRecord* record) {
   OwnSplat<1> own;
   own.LoadShape(splats, i);
-  if (!IsUsable(own.view(0), 0)) return 0;
+  if (!IsUsable(own.view(0), 0) || options.dropout.Drops(i)) return 0;
   SplatProjection<float> projection;
   if (!ProjectSplat(camera, options, own.values, &projection)) return 0;
   const ScreenEllipse<float>& ellipse = projection.ellipse;
   float reach;
-  if (!SplatReach(own.values.opacity_logit, ellipse.filter, &record->log_opacity, &reach))
+  if (!SplatReach(own.values.opacity_logit, ellipse.filter * options.dropout.gain,
+                  &record->log_opacity, &reach))
     return 0;
   record->u = ellipse.u, record->v = ellipse.v;
   record->c00 = ellipse.c00, record->c10 = ellipse.c10, record->c11 = ellipse.c11;
