@@ -17,7 +17,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr uint64_t kMostBytes = 64 << 20;
+constexpr uint64_t kMostCameraBytes = 64 << 20;
 
 BareCamera CameraOf(const JsonValue& entry) {
   BareCamera bare{entry.At("img_name").AsString(), {}};
@@ -84,7 +84,7 @@ std::vector<BareCamera> CamerasOfFolder(const fs::path& root) {
 }  // namespace
 
 std::vector<BareCamera> ReadCamerasJson(const std::string& path) {
-  const JsonValue file = ReadJsonFile(path, kMostBytes);
+  const JsonValue file = ReadJsonFile(path, kMostCameraBytes);
   if (!file.IsArray())
     throw InputError(
         "is not a list of cameras", path,

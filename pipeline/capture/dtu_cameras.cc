@@ -11,7 +11,7 @@
 namespace regrade {
 namespace {
 
-constexpr uint64_t kMostBytes = 16 << 20;
+constexpr uint64_t kMostDtuBytes = 16 << 20;
 constexpr double kMostSkew = 1e-3;      // of the focal length
 constexpr double kLeastPivot = 1e-9;    // of the largest element: below, a matrix is singular
 constexpr int kMostNumber = 1'000'000;  // of a picture
@@ -95,7 +95,7 @@ Camera CameraOfProjection(const double* projection, const std::string& where) {
 }
 
 std::map<int, Camera> ReadDtuCameras(const std::string& path) {
-  NpzReader file(path, kMostBytes);
+  NpzReader file(path, kMostDtuBytes);
   const std::vector<std::string> names = file.names();
   std::vector<int> numbers;
   bool scaled = true;

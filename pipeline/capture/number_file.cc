@@ -11,7 +11,7 @@
 namespace regrade {
 namespace {
 
-constexpr uint64_t kMostBytes = 64 << 10;
+constexpr uint64_t kMostNumberBytes = 64 << 10;
 constexpr char kBetween[] = " \t\r,";
 
 double NumberOf(std::string_view word, const std::string& where) {
@@ -25,7 +25,7 @@ double NumberOf(std::string_view word, const std::string& where) {
 }  // namespace
 
 std::vector<std::vector<double>> ReadNumberFile(const std::string& path) {
-  const std::string text = ReadWholeFile(path, kMostBytes);
+  const std::string text = ReadWholeFile(path, kMostNumberBytes);
   std::vector<std::vector<double>> lines;
   int number = 0;
   for (const std::string& line : Split(WithoutByteOrderMark(text), '\n')) {

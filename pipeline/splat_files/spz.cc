@@ -31,7 +31,7 @@ constexpr char kDamaged[] = "the file is incomplete or damaged: copy or download
 
 uint8_t ByteAt(std::string_view bytes, size_t i) { return static_cast<uint8_t>(bytes[i]); }
 
-struct Header {
+struct SpzHeader {
   uint32_t version = 0, count = 0;
   uint8_t degree = 0, fractional_bits = 0, flags = 0, streams = 0;
 };
@@ -47,7 +47,7 @@ enum Attribute {
 };
 
 struct Attributes {
-  Header header;
+  SpzHeader header;
   std::array<size_t, kAttributes> size{};  // bytes of one splat
   std::array<std::string_view, kAttributes> bytes;
   std::string_view extensions;
@@ -66,7 +66,7 @@ uint64_t MostUnpacked(std::string_view packed, uint64_t budget) {
 void ReadHeader(std::string_view bytes, uint64_t available, const std::string& where,
                 Attributes* a) {
   if (bytes.size() < kHeader || !bytes.starts_with(kMark)) Refuse("it has no header", where);
-  Header& header = a->header;
+  SpzHeader& header = a->header;
   ByteUnpacker unpack(bytes.substr(kMark.size()));
   unpack.Value(&header.version);
   unpack.Value(&header.count);
@@ -226,7 +226,7 @@ bool LooksLikeSpz(std::string_view bytes) {
 
 SplatScene ReadSpz(std::string_view bytes, uint64_t budget, const std::string& where) {
   const Attributes attributes = ReadAttributes(bytes, budget, where);
-  const Header& header = attributes.header;
+  const SpzHeader& header = attributes.header;
   const int basis = std::min(BasisOfDegree(header.degree), kMaxBasis);
   std::vector<std::string> ignored;
   const SplatTurn turn(TurnOf(attributes, where, &ignored));

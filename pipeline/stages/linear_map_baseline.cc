@@ -12,7 +12,7 @@
 namespace regrade {
 namespace {
 
-Vec3d ColorAt(const Image& image, int64_t pixel) {
+Vec3d PixelColor(const Image& image, int64_t pixel) {
   const float* c = &image.pixels[pixel * image.channels];
   return {c[0], c[1], c[2]};
 }
@@ -24,7 +24,7 @@ double SquaredError(const ColorMap& map, const FrameSource& source, const FrameS
     const Image from = source.frame(i), to = target.frame(i);
     double frame_sum = 0;
     for (int64_t p = 0; p < from.num_pixels(); ++p) {
-      const Vec3d mapped = map(ColorAt(from, p)), target_color = ColorAt(to, p);
+      const Vec3d mapped = map(PixelColor(from, p)), target_color = PixelColor(to, p);
       if (!AllFinite(target_color)) continue;
       for (int c = 0; c < 3; ++c) {
         const double d = std::clamp(mapped[c], 0.0, 1.0) - target_color[c];
@@ -50,7 +50,7 @@ std::optional<ColorMap> BestLinearMap(const FrameSource& source, const FrameSour
     before.push_back(MeasureColor(from));
     after.push_back(MeasureColor(to));
     for (int64_t p = 0; p < from.num_pixels(); ++p)
-      if (AllFinite(ColorAt(to, p))) accumulator.Add(ColorAt(from, p), ColorAt(to, p));
+      if (AllFinite(PixelColor(to, p))) accumulator.Add(PixelColor(from, p), PixelColor(to, p));
   }
   if (before.empty()) return std::nullopt;
   const ColorMap mkl = ComputeMkl(Pool(before), Pool(after)).map;

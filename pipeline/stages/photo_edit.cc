@@ -82,7 +82,7 @@ Image Minus(Image a, const Image& b) {
 }
 
 // The photo's own detail finer than two pixels: the band that sharpening raises.
-Image FineDetail(const Image& image) {
+Image DetailLayer(const Image& image) {
   const Image half = Resize(image, std::max(1, image.width / 2), std::max(1, image.height / 2));
   return Minus(image, Resize(half, image.width, image.height));
 }
@@ -142,7 +142,7 @@ PhotoEdit AnalyseEdit(const Image& photo_given, const Image& edited_given) {
   mapped = Mapped(photo, edit.table);
   const Image residual = Residual(mapped, edited, vignette), low = LowPass(residual);
   edit.local = std::sqrt(MeanSquare(low));
-  const Image fine = FineDetail(mapped), above = FineDetail(Minus(residual, low));
+  const Image fine = DetailLayer(mapped), above = DetailLayer(Minus(residual, low));
   double product = 0, square = 0;
   for (size_t i = 0; i < fine.pixels.size(); ++i) {
     product += double{fine.pixels[i]} * double{above.pixels[i]};
@@ -159,7 +159,7 @@ PhotoEdit AnalyseEdit(const Image& photo_given, const Image& edited_given) {
       edit.table = TabulateColors(2, [](const Vec3d& c) { return c; });
       mapped = photo;
     }
-    edit.layer = LayerOf(photo, edit.of_photo ? whole : residual, FineDetail(mapped),
+    edit.layer = LayerOf(photo, edit.of_photo ? whole : residual, DetailLayer(mapped),
                          std::max(0.0, edit.sharpening));
   } else {
     edit.layer = low;

@@ -22,13 +22,13 @@ namespace http = beast::http;
 using Parser = http::request_parser<http::string_body>;
 using Message = http::request<http::string_body>;
 
-std::string_view View(beast::string_view text) { return {text.data(), text.size()}; }
+std::string_view AsStringView(beast::string_view text) { return {text.data(), text.size()}; }
 
 // The header's only value; nothing if it is missing or there are several.
 std::optional<std::string_view> Only(const Message& message, http::field name) {
   const auto [begin, end] = message.equal_range(name);
   if (begin == end || std::next(begin) != end) return std::nullopt;
-  return View(begin->value());
+  return AsStringView(begin->value());
 }
 
 // In a time that does not depend on where they differ.
@@ -55,7 +55,7 @@ HttpResponse Answer(const Route& route, const Message& message) {
   try {
     return route.answer({message.body(), name == message.end()
                                              ? std::string()
-                                             : std::string(View(name->value()))});
+                                             : std::string(AsStringView(name->value()))});
   } catch (const Error& error) {
     return RefusedRequest(error.code() == ExitCode::kResources ? 507 : 422, error.what());
   } catch (const std::system_error& error) {  // of files and folders, too
@@ -117,8 +117,8 @@ const Route* RequestReader::State::RouteOf(HttpResponse* refused) const {
   if (message.count(http::field::origin) > 0 &&
       Only(message, http::field::origin) != "http://" + std::string(*host))
     return refuse(403, "another site may not ask here");
-  const std::string_view method = View(message.method_string()),
-                         target = View(message.target());
+  const std::string_view method = AsStringView(message.method_string()),
+                         target = AsStringView(message.target());
   const auto found = std::ranges::find_if(
       routes, [&](const Route& r) { return r.method == method && r.target == target; });
   if (found == routes.end() || !found->open) {

@@ -137,8 +137,9 @@ TEST(SplatDropout, LeavesOutItsShareAndRaisesTheOthersOpacities) {
     for (const SeenSplat<double>& splat : SeeSplats(splats.view(), camera, some)) {
       const size_t i = static_cast<size_t>(splat.index);
       ++times[i];
-      if (log_opacity[i] <= 0)  // it is also seen without a share, where it is less opaque
+      if (log_opacity[i] <= 0) {  // it is seen without the gain, too
         EXPECT_NEAR(splat.log_opacity - log_opacity[i], std::log(4.0 / 3), 1e-6);
+      }
     }
   }
   int once = 0, twice = 0;
