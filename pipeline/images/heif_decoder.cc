@@ -17,7 +17,7 @@ struct Free {
     Function(pointer);
   }
 };
-using Context = std::unique_ptr<heif_context, Free<heif_context_free>>;
+using HeifContext = std::unique_ptr<heif_context, Free<heif_context_free>>;
 using Handle = std::unique_ptr<heif_image_handle, Free<heif_image_handle_release>>;
 using Decoded = std::unique_ptr<heif_image, Free<heif_image_release>>;
 using Nclx = std::unique_ptr<heif_color_profile_nclx, Free<heif_nclx_color_profile_free>>;
@@ -69,7 +69,7 @@ HeifPicture DecodeHeif(std::string_view bytes, const std::string& where,
                            (error.message == nullptr ? "no reason given" : error.message),
                        where, "convert it to JPEG (or 16-bit TIFF) first");
   };
-  const Context context(heif_context_alloc());
+  const HeifContext context(heif_context_alloc());
   REGRADE_CHECK(context != nullptr);
   require(heif_context_read_from_memory_without_copy(context.get(), bytes.data(), bytes.size(),
                                                      nullptr));
