@@ -30,9 +30,9 @@ const char* NameOf(SplatFormat format) {
   return "";
 }
 
-int DegreeOf(int basis) { return static_cast<int>(std::lround(std::sqrt(basis))) - 1; }
-
 }  // namespace
+
+int DegreeOf(int basis) { return static_cast<int>(std::lround(std::sqrt(basis))) - 1; }
 
 SplatScene ReadForeignSplats(const RunContext& context, bool say) {
   const uint64_t memory =

@@ -9,8 +9,11 @@
 
 namespace regrade {
 
-// Reads the run's file, within --max-memory. `say`: for
-// the console, once a run. Throws Error(kInput) as ReadSplats.
+// Of so many harmonics a channel.
+int DegreeOf(int basis);
+
+// Reads the run's file, within --max-memory. `say`: tells the console what is in it, which one
+// stage of a run does. Throws Error(kInput) as ReadSplats.
 SplatScene ReadForeignSplats(const RunContext& context, bool say);
 
 // In the file's own world, to place views in it.

@@ -18,8 +18,6 @@
 namespace regrade {
 namespace {
 
-int DegreeOf(int basis) { return basis > 9 ? 3 : basis > 4 ? 2 : basis > 1 ? 1 : 0; }
-
 // The photos' exposures are left: the splats were fitted to them as they are. A render has no
 // transparent parts, and its background is that of the file.
 std::string EffectsOf(const RunSettings& settings, const Capture& capture) {

@@ -10,14 +10,14 @@
 #include "kernels/splats/splat_color.h"
 #include "kernels/splats/splat_field.h"
 #include "reconstruct/colmap/colmap_model.h"
+#include "reconstruct/views/splat_extent.h"
 
 namespace regrade {
 namespace {
 
 constexpr int64_t kMostPoints = 8000;
-constexpr int kSide = 160;              // pixels of the longer side of the depths
-constexpr double kSameDepth = 0.05;     // relative: a splat at the depth that a view shows
-constexpr float kOpaqueLogit = -0.85f;  // opacity 0.3: others show little by themselves
+constexpr int kSide = 160;           // pixels of the longer side of the depths
+constexpr double kSameDepth = 0.05;  // relative: a splat at the depth that a view shows
 
 Camera Small(const Camera& camera) {
   const Camera pinhole = camera.Undistorted();
@@ -34,17 +34,6 @@ bool Shows(const Camera& small, const Image& depths, const Vec3d& point) {
   return shown > 0 && std::abs(depth - shown) <= kSameDepth * shown;
 }
 
-// Every n-th splat that shows by itself.
-std::vector<int64_t> SomeSplats(const SplatsView<float>& splats) {
-  std::vector<int64_t> opaque, some;
-  for (int64_t i = 0; i < splats.count; ++i)
-    if (splats.opacity_logit[i] > kOpaqueLogit) opaque.push_back(i);
-  const int64_t count = std::min(kMostPoints, std::ssize(opaque));
-  for (int64_t k = 0; k < count; ++k)
-    some.push_back(opaque[static_cast<size_t>(k * std::ssize(opaque) / count)]);
-  return some;
-}
-
 }  // namespace
 
 void AddSplatPoints(const RadianceField& field, const FieldRenderer& renderer,
@@ -54,13 +43,14 @@ void AddSplatPoints(const RadianceField& field, const FieldRenderer& renderer,
   ColmapModel model = ReadColmapModel(sparse_folder);
   std::map<std::string, ColmapImage*> image_of;
   for (ColmapImage& image : model.images) image_of[image.name] = &image;
-  const std::vector<int64_t> some = SomeSplats(splats);
+  const std::vector<int64_t> some = OpaqueSplats(splats, kMostPoints);
   std::vector<ScenePoint> points(some.size());
   for (size_t k = 0; k < some.size(); ++k) {
     points[k].position = splats[some[k]].mean.Cast<double>();
     const float* const sh = splats.Coefficients(some[k]);
     for (int c = 0; c < 3; ++c)
-      points[k].color[c] = std::clamp(0.5f + 0.28209479f * sh[c * splats.basis], 0.0f, 1.0f);
+      points[k].color[c] =
+          std::clamp(0.5f + static_cast<float>(kSh0) * sh[c * splats.basis], 0.0f, 1.0f);
   }
   for (size_t v = 0; v < capture->views.size(); ++v) {
     const Camera small = Small(capture->views[v].camera);

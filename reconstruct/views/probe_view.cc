@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "kernels/base/quantile.h"
+#include "reconstruct/views/splat_extent.h"
 
 namespace regrade {
 namespace {
@@ -13,7 +14,6 @@ constexpr double kJump = 0.2;                   // of depth, relative
 constexpr double kSameDepth = 0.06;             // likewise, of a splat that is not hidden
 constexpr double kFinest = 0.4, kCoarsest = 4;  // pixels of a picture of kWidth
 constexpr double kWidth = 480;
-constexpr float kOpaqueLogit = -0.85f;  // opacity 0.3
 
 float SeenAt(const Camera& camera, const Image& depths, const SplatSample& sample) {
   double u = 0, v = 0, depth = 0;
@@ -35,14 +35,9 @@ double ViewProbe::Quality() const {
 
 std::vector<SplatSample> SampleSplats(const Splats& splats, int64_t most) {
   const SplatsView<float> view = splats.view();
-  std::vector<int64_t> opaque;
-  for (int64_t i = 0; i < view.count; ++i)
-    if (view.opacity_logit[i] > kOpaqueLogit) opaque.push_back(i);
-  const int64_t count = std::min(most, std::ssize(opaque));
   std::vector<SplatSample> samples;
-  for (int64_t k = 0; k < count; ++k) {
-    const Splat<float> splat =
-        view[opaque[static_cast<size_t>(k * std::ssize(opaque) / count)]];
+  for (const int64_t i : OpaqueSplats(view, most)) {
+    const Splat<float> splat = view[i];
     const double a = splat.log_scale[0], b = splat.log_scale[1], c = splat.log_scale[2];
     const double middle = std::max(std::min(a, b), std::min(std::max(a, b), c));
     samples.push_back({splat.mean.Cast<double>(), std::exp(std::min(80.0, middle))});

@@ -8,11 +8,11 @@
 
 #include "kernels/base/quantile.h"
 #include "kernels/splats/covariance.h"
+#include "reconstruct/views/splat_extent.h"
 
 namespace regrade {
 namespace {
 
-constexpr float kSolidLogit = -0.85f;            // opacity 0.3
 constexpr double kFlat = 0.4;                    // thickness over the next axis
 const double kNearWay = std::cos(0.52);          // 30 degrees: of the first mean
 const double kOnPlane = std::cos(0.21);          // 12 degrees
@@ -38,7 +38,7 @@ std::vector<FlatSplat> FlatSplats(const SplatsView<float>& splats) {
   std::vector<FlatSplat> flat;
   std::vector<double> areas;
   for (int64_t i = 0; i < splats.count; ++i) {
-    if (splats.opacity_logit[i] < kSolidLogit) continue;
+    if (splats.opacity_logit[i] < kOpaqueLogit) continue;
     const Splat<float> splat = splats[i];
     int order[3] = {0, 1, 2};
     std::ranges::sort(order, {}, [&](int a) { return splat.log_scale[a]; });
@@ -80,7 +80,7 @@ std::optional<Vec3d> GroundNear(const std::vector<FlatSplat>& flat, const Splats
     ground.push_back(Dot(splat.mean, up));
   }
   for (int64_t i = 0; i < splats.count(); ++i)
-    if (splats.opacity_logit[static_cast<size_t>(i)] >= kSolidLogit)
+    if (splats.opacity_logit[static_cast<size_t>(i)] >= kOpaqueLogit)
       all.push_back(Dot(splats.view()[i].mean.Cast<double>(), up));
   if (static_cast<double>(ground.size()) < kFewestOnGround * static_cast<double>(all.size()) ||
       on_plane < kShareOfGround * total || Median(ground) > Quantile(all, kLow))

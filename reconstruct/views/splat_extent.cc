@@ -44,4 +44,14 @@ SplatExtent ExtentOf(const Splats& splats) {
   return extent;
 }
 
+std::vector<int64_t> OpaqueSplats(const SplatsView<float>& splats, int64_t most) {
+  std::vector<int64_t> opaque, some;
+  for (int64_t i = 0; i < splats.count; ++i)
+    if (splats.opacity_logit[i] >= kOpaqueLogit) opaque.push_back(i);
+  const int64_t count = std::min(most, std::ssize(opaque));
+  for (int64_t k = 0; k < count; ++k)
+    some.push_back(opaque[static_cast<size_t>(k * std::ssize(opaque) / count)]);
+  return some;
+}
+
 }  // namespace regrade

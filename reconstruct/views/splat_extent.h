@@ -1,6 +1,9 @@
 // Where the splats of a scene are that is not known otherwise.
 #pragma once
 
+#include <cstdint>
+#include <vector>
+
 #include "kernels/base/vec.h"
 #include "kernels/splats/splats.h"
 
@@ -15,5 +18,12 @@ struct SplatExtent {
 };
 
 SplatExtent ExtentOf(const Splats& splats);
+
+// Splats of less opacity than 0.3 show little by themselves.
+inline constexpr float kOpaqueLogit = -0.85f;
+
+// Indices of the splats of at least that opacity, in their order: all, or `most`, evenly
+// spread.
+std::vector<int64_t> OpaqueSplats(const SplatsView<float>& splats, int64_t most);
 
 }  // namespace regrade
