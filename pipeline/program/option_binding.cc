@@ -16,12 +16,22 @@ namespace {
 namespace po = boost::program_options;
 using Words = std::vector<std::string>;
 
+constexpr const char* kAuto = "auto";
+
 // The shortest text that reads back as the same value, independent of the locale.
 template <typename T>
 std::string NumberText(T value) {
   char text[64];
   const auto result = std::to_chars(text, text + sizeof text, value);
   return std::string(text, result.ptr);
+}
+
+// The double nearest to the float's shortest text: 0.1, not 0.10000000149.
+double ShortestDouble(float value) {
+  double nearest = 0;
+  const std::string text = NumberText(value);
+  std::from_chars(text.data(), text.data() + text.size(), nearest);
+  return nearest;
 }
 
 std::string BoundsText(const OptionInfo& info) {
@@ -39,12 +49,13 @@ std::string BoundsText(const OptionInfo& info) {
 
 // The whole text must be one finite number within the bounds.
 template <typename T>
-T ParseNumber(const std::string& text, const OptionInfo& info, const std::string& where) {
+T ParseNumber(const std::string& text, const OptionInfo& info, const std::string& where,
+              const std::string& or_else = "") {
   T value{};
   const char* end = text.data() + text.size();
   const auto result = std::from_chars(text.data(), end, value);
   const std::string allowed =
-      BoundsText(info) + (std::is_integral_v<T> ? ", a whole number" : "");
+      or_else + BoundsText(info) + (std::is_integral_v<T> ? ", a whole number" : "");
   if (result.ec != std::errc() || result.ptr != end || text.empty())
     RefuseValue(where, text, allowed);
   if constexpr (std::is_floating_point_v<T>)
@@ -216,6 +227,10 @@ void OptionSet::Assign(const Entry& entry, const std::string& text, const std::s
           *target = values;
         } else if constexpr (std::is_same_v<T, std::vector<std::string>>) {
           target->push_back(text);
+        } else if constexpr (std::is_same_v<T, std::optional<float>>) {
+          *target = text == kAuto
+                        ? std::nullopt
+                        : std::optional(ParseNumber<float>(text, info, where, "auto or "));
         } else {
           *target = ParseNumber<T>(text, info, where);
         }
@@ -271,11 +286,9 @@ JsonValue OptionSet::ValueOf(const Entry& entry) {
           for (const std::string& value : *target) array.emplace_back(value);
           return array;
         } else if constexpr (std::is_same_v<T, float>) {
-          // The double nearest to the float's shortest text: 0.1, not 0.10000000149.
-          double value = 0;
-          const std::string text = NumberText(*target);
-          std::from_chars(text.data(), text.data() + text.size(), value);
-          return value;
+          return ShortestDouble(*target);
+        } else if constexpr (std::is_same_v<T, std::optional<float>>) {
+          return target->has_value() ? JsonValue(ShortestDouble(**target)) : JsonValue(kAuto);
         } else {
           return *target;
         }

@@ -64,8 +64,9 @@ class OptionSet {
   int count() const { return static_cast<int>(entries_.size()); }
 
  private:
-  using Target = std::variant<bool*, int*, int64_t*, uint64_t*, float*, double*, std::string*,
-                              std::vector<int>*, std::vector<std::string>*>;
+  using Target =
+      std::variant<bool*, int*, int64_t*, uint64_t*, float*, std::optional<float>*, double*,
+                   std::string*, std::vector<int>*, std::vector<std::string>*>;
   struct Entry {
     std::string heading, name;
     Target target;

@@ -2,8 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <initializer_list>
 #include <numeric>
+#include <optional>
 
 #include "kernels/base/error.h"
 
@@ -12,43 +12,38 @@ namespace {
 
 constexpr int64_t kLeastRays = 4096, kMostRays = 14336;
 
-using Rate = float FitOptions::*;
-
-// Takes the values of `other`, except those that were asked for.
-void TakeDefaults(const FitOptions& other, std::initializer_list<Rate> rates,
-                  FitOptions* options) {
-  const FitOptions plain;
-  for (const Rate rate : rates)
-    if (options->*rate == plain.*rate) options->*rate = other.*rate;
-}
+// What suits a capture, where nothing was asked for.
+struct SuitableRates {
+  float rate_density = 58, rate_density_end = 24;
+  float tv_density = 5e-2f, tv_sh = 4e-3f;
+  float free_space = 0.02f;
+};
 
 // Cells a side, from which on the weight of total variation grows with them.
 constexpr float kVariationSide = 768;
 
 // Chosen on a forward-facing capture at two sizes and on a synthetic one; see COSTS.md. Across
 // a cell half as wide values differ half as much, so the weight of total variation is doubled.
-void AdaptToDeviceCoordinates(FitOptions* options) {
-  FitOptions other;
-  other.rate_density = 12;
-  other.rate_density_end = 2;
-  other.free_space = 0;
-  const float finer =
-      std::max(1.0f, static_cast<float>(options->resolutions.back()) / kVariationSide);
-  other.tv_density *= finer;
-  other.tv_sh *= finer;
-  TakeDefaults(other,
-               {&FitOptions::rate_density, &FitOptions::rate_density_end,
-                &FitOptions::free_space, &FitOptions::tv_density, &FitOptions::tv_sh},
-               options);
-  options->max_cells = std::min(options->max_cells, options->max_forward_cells);
+SuitableRates RatesInDeviceCoordinates(int finest) {
+  SuitableRates rates{.rate_density = 12, .rate_density_end = 2, .free_space = 0};
+  const float finer = std::max(1.0f, static_cast<float>(finest) / kVariationSide);
+  rates.tv_density *= finer;
+  rates.tv_sh *= finer;
+  return rates;
 }
 
 // Chosen on a synthetic capture with transparent photos; see COSTS.md.
-void AdaptToKnownBackground(FitOptions* options) {
-  FitOptions other;
-  other.tv_density = 2e-3f;
-  other.tv_sh = 1.6e-4f;
-  TakeDefaults(other, {&FitOptions::tv_density, &FitOptions::tv_sh}, options);
+SuitableRates RatesBeforeKnownBackground() { return {.tv_density = 2e-3f, .tv_sh = 1.6e-4f}; }
+
+void FillIn(const SuitableRates& rates, FitOptions* options) {
+  const auto fill = [](float suitable, std::optional<float>* asked) {
+    if (!asked->has_value()) *asked = suitable;
+  };
+  fill(rates.rate_density, &options->rate_density);
+  fill(rates.rate_density_end, &options->rate_density_end);
+  fill(rates.tv_density, &options->tv_density);
+  fill(rates.tv_sh, &options->tv_sh);
+  fill(rates.free_space, &options->free_space);
 }
 
 void DropStages(int64_t pixels, FitOptions* options) {
@@ -72,12 +67,12 @@ FitOptions AdaptOptions(FitOptions options, const FitConditions& conditions) {
     options.rays_per_step = static_cast<int>(
         std::clamp(rays, kLeastRays, conditions.on_card ? kMostRays : kLeastRays));
   }
-  if (options.adaptive()) {
-    if (conditions.device_coordinates)
-      AdaptToDeviceCoordinates(&options);
-    else if (conditions.known_background)
-      AdaptToKnownBackground(&options);
-  }
+  const bool forward = options.adaptive() && conditions.device_coordinates;
+  if (forward) options.max_cells = std::min(options.max_cells, options.max_forward_cells);
+  FillIn(forward ? RatesInDeviceCoordinates(options.resolutions.back())
+         : options.adaptive() && conditions.known_background ? RatesBeforeKnownBackground()
+                                                             : SuitableRates(),
+         &options);
   return options;
 }
 

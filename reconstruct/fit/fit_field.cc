@@ -67,7 +67,7 @@ class Fitter {
   }
 
   FitResult Run() {
-    if (options_.adaptive() && options_.free_space > 0) {
+    if (options_.adaptive() && *options_.free_space > 0) {
       const float cell = 2 * std::max({box_.radius.x, box_.radius.y, box_.radius.z}) /
                          static_cast<float>(options_.resolutions[0]);
       engine_->SetFreeRays(FreeRays(views_, kFreeMargin * cell, options_.seed));
@@ -210,18 +210,18 @@ class Fitter {
     step.march = {options_.step, options_.stop_transmittance};
     step.optimizer.rate_sh = ExponentialRate(options_.rate_sh, options_.rate_sh_end, p);
     step.optimizer.rate_density =
-        ExponentialRate(options_.rate_density, options_.rate_density_end, p) *
+        ExponentialRate(*options_.rate_density, *options_.rate_density_end, p) *
         DelayFactor(number, options_.density_delay * static_cast<float>(total_steps_));
     step.optimizer.view_bound = options_.view_bound;
     if (!options_.bound_mean) step.optimizer.mean_bound = kUnbounded;
     step.losses = {options_.beta_loss, options_.sparsity_loss};
     if (options_.adaptive()) {
       step.free_rays = std::max(1, options_.rays_per_step / kRaysPerFreeRay);
-      step.free_space = options_.free_space;
+      step.free_space = *options_.free_space;
     }
     step.tv_fraction = options_.tv_fraction;
-    step.tv_density = decay * options_.tv_density;
-    step.tv_sh = decay * options_.tv_sh;
+    step.tv_density = decay * *options_.tv_density;
+    step.tv_sh = decay * *options_.tv_sh;
     if (!box_.spheres) return step;
     step.optimizer.rate_sphere_density = ExponentialRate(
         options_.rate_background_density, options_.rate_background_density_end, p);

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -21,14 +22,12 @@ struct FitOptions {
   float view_bound = 0.2f;
   float step = 1.0f;
   float stop_transmittance = 1e-3f;
-  float rate_density = 58.0f;
-  float rate_density_end = 24.0f;
+  // Without a value: see AdaptOptions.
+  std::optional<float> rate_density, rate_density_end, tv_density, tv_sh, free_space;
   int rate_steps = 0;
   float density_delay = 0;
   float rate_sh = 5e-2f;
   float rate_sh_end = 2e-3f;
-  float tv_density = 5e-2f;
-  float tv_sh = 4e-3f;
   float tv_decay = 0.7f;
   float tv_fraction = 0.02f;
   float beta_loss = 0;
@@ -55,7 +54,6 @@ struct FitOptions {
   float background_lead = 0.25f;
   float cell_pixels = 1.0f;
   float max_cells = 5.0f, max_forward_cells = 12.0f;
-  float free_space = 0.02f;
   int outward = 2;
   int shards = 0;
   bool exact_sums = false;
@@ -146,11 +144,16 @@ struct FitOptions {
           .min = 0,
           .max = 0.1});
     bind("fit-rate-density", rate_density,
-         {.help = "RMSProp learning rate of densities at the start", .min = 0, .max = 1e4});
-    bind("fit-rate-density-end", rate_density_end,
-         {.help = "learning rate of densities at the end (exponential in between)",
+         {.help = "RMSProp learning rate of densities at the start; auto: 58, of photos that "
+                  "face one way 12",
           .min = 0,
           .max = 1e4});
+    bind(
+        "fit-rate-density-end", rate_density_end,
+        {.help = "learning rate of densities at the end (exponential in between); auto: 24, of "
+                 "photos that face one way 2",
+         .min = 0,
+         .max = 1e4});
     bind("fit-rate-steps", rate_steps,
          {.unit = "steps",
           .help = "learning rates reach their ends after so many steps, even if the fit ends "
@@ -169,11 +172,16 @@ struct FitOptions {
          {.help = "learning rate of colours at the end", .min = 0, .max = 10});
     bind("tv-density", tv_density,
          {.help =
-              "weight of the total variation of densities: smoother surfaces, fewer floaters",
+              "weight of the total variation of densities: smoother surfaces, fewer floaters; "
+              "auto: 0.05, of transparent photos 0.002",
           .min = 0,
           .max = 10});
-    bind("tv-sh", tv_sh,
-         {.help = "weight of the total variation of colours", .min = 0, .max = 10});
+    bind(
+        "tv-sh", tv_sh,
+        {.help = "weight of the total variation of colours; auto: 0.004, of transparent photos "
+                 "0.00016",
+         .min = 0,
+         .max = 10});
     bind("tv-decay", tv_decay,
          {.help = "factor on the weights of total variation at each finer stage",
           .min = 0,
@@ -287,7 +295,8 @@ struct FitOptions {
          .max = 5});
     bind("fit-free-space", free_space,
          {.help = "adaptive field: keeps the space clear between cameras and the points they "
-                  "saw; less fog where few photos look",
+                  "saw; less fog where few photos look; auto: 0.02, of photos that face one "
+                  "way 0",
           .min = 0,
           .max = 10});
     bind("fit-shards", shards,

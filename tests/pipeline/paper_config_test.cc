@@ -140,8 +140,8 @@ TEST(PaperConfig, ResolvedSettingsAreThePublishedOnes) {
     const double done = Steps(fit) / fit.rate_steps;
     EXPECT_EQ(fit.rate_density, 30.0f);
     EXPECT_EQ(fit.rate_sh, 1e-2f);
-    ExpectPrinted(ExponentialRate(fit.rate_density, fit.rate_density_end, done), p.density_rate,
-                  "rate of densities at the end");
+    ExpectPrinted(ExponentialRate(*fit.rate_density, *fit.rate_density_end, done),
+                  p.density_rate, "rate of densities at the end");
     ExpectPrinted(ExponentialRate(fit.rate_sh, fit.rate_sh_end, done), p.sh_rate,
                   "rate of colours at the end");
     const bool background = p.sphere_rate > 0;
@@ -172,8 +172,8 @@ TEST(PaperConfig, ResolvedSettingsAreThePublishedOnes) {
     EXPECT_EQ(fit.max_voxels, 44.0f);
     for (size_t s = 0; s < p.tv_density.size(); ++s) {
       const float decay = std::pow(fit.tv_decay, static_cast<float>(s));
-      EXPECT_FLOAT_EQ(fit.tv_density * decay, static_cast<float>(p.tv_density[s])) << s;
-      EXPECT_FLOAT_EQ(fit.tv_sh * decay, static_cast<float>(p.tv_sh[s])) << s;
+      EXPECT_FLOAT_EQ(*fit.tv_density * decay, static_cast<float>(p.tv_density[s])) << s;
+      EXPECT_FLOAT_EQ(*fit.tv_sh * decay, static_cast<float>(p.tv_sh[s])) << s;
     }
     EXPECT_EQ(fit.tv_fraction, 0.01f);
     EXPECT_EQ(fit.sparsity_loss, static_cast<float>(p.sparsity));

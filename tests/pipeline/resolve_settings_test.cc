@@ -128,9 +128,11 @@ TEST(ResolveSettings, LaterSourcesOverrideEarlierOnes) {
   r = Resolve({"--preset", "best", "--field", "voxels", "--fit-field", "uniform"});
   EXPECT_TRUE(r.settings.fit.prune_last);  // a uniform field is what it was
   r = Resolve({"--preset", "paper", "--fit-field", "uniform"});
-  EXPECT_EQ(r.settings.fit.rate_density, 30);  // its own: the field is uniform there, too
+  EXPECT_EQ(r.settings.fit.rate_density, 30.0f);  // its own: the field is uniform there, too
   r = Resolve({"--preset", "paper", "--fit-field", "adaptive"});
-  EXPECT_EQ(r.settings.fit.rate_density, FitOptions().rate_density);
+  EXPECT_EQ(r.settings.fit.rate_density, std::nullopt);
+  r = Resolve({"--field", "voxels", "--tv-density", "0.05"});
+  EXPECT_EQ(r.settings.fit.tv_density, 0.05f);
 
   r = Resolve({"--preset", "best", "--photo-size", "320", "--recipe", "paper"}, sources);
   EXPECT_EQ(r.settings.scene.photo_size, 320);

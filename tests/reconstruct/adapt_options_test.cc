@@ -45,14 +45,13 @@ TEST(AdaptOptions, StagesFinerThanThePhotosAreLeftOut) {
 TEST(AdaptOptions, DeviceCoordinatesHaveRatesOfTheirOwnAndWhatWasAskedForStays) {
   FitOptions options;
   const FitOptions elsewhere = AdaptOptions(options, {});
-  EXPECT_EQ(elsewhere.rate_density, options.rate_density);
-  EXPECT_GT(elsewhere.free_space, 0);
+  EXPECT_GT(elsewhere.free_space, 0.0f);
   options.rate_density_end = 7;
   const FitOptions forward = AdaptOptions(options, {.device_coordinates = true});
-  EXPECT_LT(forward.rate_density, options.rate_density);
-  EXPECT_EQ(forward.free_space, 0);
-  EXPECT_EQ(forward.rate_density_end, 7);
-  EXPECT_EQ(forward.tv_sh, options.tv_sh);
+  EXPECT_LT(forward.rate_density, elsewhere.rate_density);
+  EXPECT_EQ(forward.free_space, 0.0f);
+  EXPECT_EQ(forward.rate_density_end, 7.0f);
+  EXPECT_EQ(forward.tv_sh, elsewhere.tv_sh);
   const FitOptions again = AdaptOptions(forward, {.device_coordinates = true});
   EXPECT_EQ(again.rate_density, forward.rate_density);
   EXPECT_EQ(again.rate_density_end, forward.rate_density_end);
@@ -71,7 +70,7 @@ TEST(AdaptOptions, H192_NarrowCellsInDeviceCoordinates) {
   options.max_cells = 20;
   options.tv_sh = 0.5f;
   const FitOptions forward = AdaptOptions(options, {.device_coordinates = true});
-  EXPECT_FLOAT_EQ(forward.tv_density, 2 * options.tv_density);
+  EXPECT_FLOAT_EQ(*forward.tv_density, 2 * *AdaptOptions(options, {}).tv_density);
   EXPECT_EQ(forward.tv_sh, 0.5f);
   EXPECT_EQ(forward.max_cells, options.max_forward_cells);
   const FitOptions again = AdaptOptions(forward, {.device_coordinates = true});
@@ -83,20 +82,36 @@ TEST(AdaptOptions, H192_NarrowCellsInDeviceCoordinates) {
   const FitOptions few = AdaptOptions(options, {.device_coordinates = true});
   EXPECT_EQ(few.max_cells, 3);
   EXPECT_EQ(NoteOfAdapting(options, few), "");
-  EXPECT_EQ(AdaptOptions(options, {}).tv_density, options.tv_density);
 }
 
 TEST(AdaptOptions, AKnownBackgroundHasLessTotalVariation) {
   FitOptions options;
   options.tv_sh = 0.5f;
   const FitOptions known = AdaptOptions(options, {.known_background = true});
-  EXPECT_LT(known.tv_density, options.tv_density);
+  const FitOptions elsewhere = AdaptOptions(options, {});
+  EXPECT_LT(known.tv_density, elsewhere.tv_density);
   EXPECT_EQ(known.tv_sh, 0.5f);
-  EXPECT_EQ(known.rate_density, options.rate_density);
+  EXPECT_EQ(known.rate_density, elsewhere.rate_density);
   const FitOptions again = AdaptOptions(known, {.known_background = true});
   EXPECT_EQ(again.tv_density, known.tv_density);
   options.MakeUniform();
   EXPECT_EQ(AdaptOptions(options, {.known_background = true}).tv_density, options.tv_density);
+}
+
+// A value that was asked for stays, even if it is what other captures have by default.
+TEST(AdaptOptions, ValuesAskedForStayWhereTheyAreTheDefaultsOfOthers) {
+  FitOptions plain = AdaptOptions({}, {});
+  plain.resolutions = {48, 1536};
+  plain.steps = {1, 1};
+  for (const FitConditions& conditions :
+       {FitConditions{.device_coordinates = true}, FitConditions{.known_background = true}}) {
+    const FitOptions adapted = AdaptOptions(plain, conditions);
+    EXPECT_EQ(adapted.tv_density, plain.tv_density);
+    EXPECT_EQ(adapted.tv_sh, plain.tv_sh);
+    EXPECT_EQ(adapted.rate_density, plain.rate_density);
+    EXPECT_EQ(adapted.rate_density_end, plain.rate_density_end);
+    EXPECT_EQ(adapted.free_space, plain.free_space);
+  }
 }
 
 }  // namespace
