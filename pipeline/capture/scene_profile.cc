@@ -121,7 +121,7 @@ bool ShowsThroughPhotos(const Capture& capture) {
 }
 
 SceneProfile ProfileScene(const Capture& capture, int sh_degree, const std::string& effects,
-                          const BoxOptions& box) {
+                          const BoxOptions& box, bool splats) {
   const std::map<std::string, bool> overrides = ParseEffects(effects);
   const auto decided = [&overrides](const char* name, bool measured) {
     const auto override = overrides.find(name);
@@ -141,7 +141,7 @@ SceneProfile ProfileScene(const Capture& capture, int sh_degree, const std::stri
 
   const Capture sure = WithParallax(capture, kLeastParallaxDeg);
   const ForwardFacing forward = MeasureForwardFacing(sure);
-  const bool ndc = decided("ndc", forward.on && !alpha);
+  const bool ndc = !splats && decided("ndc", forward.on && !alpha);
   profile.effects.push_back(Row("ndc", ndc, forward.angle_deg, kForwardAngle,
                                 "forward-facing cameras: largest angle of an optical axis "
                                 "to their mean, degrees"));
@@ -153,19 +153,21 @@ SceneProfile ProfileScene(const Capture& capture, int sh_degree, const std::stri
       decided("background", surroundings.far_fraction > kFarFraction && !ndc && !alpha);
   if (background && (ndc || alpha))
     throw UsageError(
-        std::string("background spheres cannot be combined with ") + (ndc ? "ndc" : "alpha"),
+        std::string("a far background cannot be combined with ") + (ndc ? "ndc" : "alpha"),
         "--effects background=on", ndc ? "add ndc=off" : "add alpha=off");
   profile.effects.push_back(
       Row("background", background, surroundings.far_fraction, kFarFraction,
-          "spheres around the box, for scenes with much far background: fraction of "
-          "observations of points beyond four times the cameras' extent"));
+          std::string(splats ? "far splats" : "spheres") +
+              " around the box, for scenes with much far background: fraction of "
+              "observations of points beyond four times the cameras' extent"));
   profile.effects.push_back(Row(kViewDependence, sh_degree > 0, sh_degree, 0,
                                 "degree of the fit's spherical harmonics, as set"));
 
   const bool cube = !ndc && box.camera_range > 0;
-  profile.scene = ndc                  ? NormalizeForwardFacing(sure, forward, box.margin)
-                  : background || cube ? NormalizeSurrounded(sure, surroundings)
-                                       : NormalizeScene(sure);
+  const bool surrounded = cube || (background && !splats);
+  profile.scene = ndc          ? NormalizeForwardFacing(sure, forward, box.margin)
+                  : surrounded ? NormalizeSurrounded(sure, surroundings)
+                               : NormalizeScene(sure);
   profile.scene.box.spheres = background;
   if (alpha && !silhouettes.empty()) {
     if (!ndc && !cube) profile.scene = TightenToSilhouettes(profile.scene, silhouettes);

@@ -21,7 +21,7 @@ struct SceneProfile {
   // "ndc": forward-facing cameras (forward_facing.h).
   // "alpha": all photos have transparent parts; the background is white, the box the object's.
   // "background": much of the scene is far beyond what the cameras surround
-  //   (normalize_scene.h); it is modelled on spheres outside the box.
+  //   (normalize_scene.h); it is modelled on spheres outside the box, or by far splats.
   // "view-dependence": colours change with direction, up to `sh_degree`; the fit's trial
   // decides. "exposure": photos differ in brightness or white balance by more than noise
   // explains, and
@@ -36,10 +36,11 @@ struct SceneProfile {
 // True if every photo has transparent parts, more than a soft edge has.
 bool ShowsThroughPhotos(const Capture& capture);
 
-// Independent of the photos' order (H154). Reads every photo, unless "exposure=off". Throws
-// Error(kScene) for a requested effect that the capture does not allow.
+// Independent of the photos' order (H154). Reads every photo, unless "exposure=off". `splats`
+// lie in the world as it is: they need no device coordinates, and their box holds far points,
+// too. Throws Error(kScene) for a requested effect that the capture does not allow.
 SceneProfile ProfileScene(const Capture& capture, int sh_degree, const std::string& effects,
-                          const BoxOptions& box = {});
+                          const BoxOptions& box = {}, bool splats = false);
 
 // "distortion on: 12.3 > 0.5 (largest shift ...)"
 std::string EffectLine(const EffectReport& effect);

@@ -61,7 +61,7 @@ void RunPack(const Command& command, const Arguments& arguments, Console* consol
       throw InputError("was posed with --photo-masks, which a packed capture cannot hold",
                        folder, "pose it again without them");
   const SceneProfile profile =
-      ProfileScene(capture, 2, scene.EffectsOf(run.effects), scene.box);
+      ProfileScene(capture, 2, run.effects, scene.box, scene.UsesSplats());
   for (const EffectReport& effect : profile.effects) console->Info(EffectLine(effect));
   for (const std::string& notice : profile.notices) console->Info(notice);
   PackedCapture packed;

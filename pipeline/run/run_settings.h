@@ -42,11 +42,6 @@ struct SceneOptions {
     box.Describe(bind);
   }
   bool UsesSplats() const { return field == "splats"; }
-  // The effects that were asked for, and none that this kind of field needs not: splats lie in
-  // the world, far ones too.
-  std::string EffectsOf(const std::string& asked) const {
-    return asked + (UsesSplats() ? ",ndc=off,background=off" : "");
-  }
 };
 
 // What the program needs to know of a file of splats that is given in place of photos.
@@ -187,7 +182,6 @@ struct RunSettings {
   // Under the headings of the help.
   void Bind(OptionSet* options);
 
-  std::string Effects() const { return scene.EffectsOf(run.effects); }
   int sh_degree() const { return scene.UsesSplats() ? splats.sh_degree : fit.sh_degree; }
 };
 

@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "kernels/base/error.h"
-#include "pipeline/capture/scene_profile.h"
+#include "pipeline/run/profile_run.h"
 #include "pipeline/stages/field_fit.h"
 
 namespace regrade {
@@ -12,10 +12,7 @@ namespace {
 
 // The box in which the scene's own field was fitted; its frame may reach further out.
 SceneBox BoxOf(const Capture& capture, const RunSettings& settings, const Vec3f& background) {
-  // The box does not depend on exposures, and measuring them would read every photo.
-  SceneBox box = ProfileScene(capture, settings.sh_degree(),
-                              settings.Effects() + ",exposure=off", settings.scene.box)
-                     .scene.box;
+  SceneBox box = SceneOfRun(settings, capture).box;
   if (box.background) box.background = background;
   return box;
 }

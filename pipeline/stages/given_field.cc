@@ -21,7 +21,7 @@ namespace {
 // The photos' exposures are left: the splats were fitted to them as they are. A render has no
 // transparent parts, and its background is that of the file.
 std::string EffectsOf(const RunSettings& settings, const Capture& capture) {
-  return settings.Effects() + ",exposure=off" + (capture.rendered ? ",alpha=off" : "");
+  return settings.run.effects + ",exposure=off" + (capture.rendered ? ",alpha=off" : "");
 }
 
 StageOutcome ReadGivenField(RunContext* context, const ProgressFunction& progress) {
@@ -33,7 +33,7 @@ StageOutcome ReadGivenField(RunContext* context, const ProgressFunction& progres
   ReportOrThrow(progress, 1, 3);
   const int degree = DegreeOf(file.splats.basis);
   SceneProfile profile =
-      ProfileScene(capture, degree, EffectsOf(settings, capture), settings.scene.box);
+      ProfileScene(capture, degree, EffectsOf(settings, capture), settings.scene.box, true);
   const NormalizedScene& scene = profile.scene;
   if (!scene.notice.empty()) context->console->Info(scene.notice);
   for (EffectReport& effect : profile.effects) {

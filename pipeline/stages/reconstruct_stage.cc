@@ -5,7 +5,6 @@
 
 #include "kernels/base/error.h"
 #include "pipeline/capture/capture_store.h"
-#include "pipeline/capture/scene_profile.h"
 #include "pipeline/capture/working_views.h"
 #include "pipeline/fields/field_file.h"
 #include "pipeline/files/text.h"
@@ -15,6 +14,7 @@
 #include "pipeline/run/fit_memory.h"
 #include "pipeline/run/paper_config.h"
 #include "pipeline/run/paper_traits.h"
+#include "pipeline/run/profile_run.h"
 #include "pipeline/run/run_context.h"
 #include "pipeline/stages/field_fit.h"
 #include "pipeline/stages/fit_quality.h"
@@ -93,8 +93,7 @@ StageOutcome Reconstruct(RunContext* context, const JsonValue& inputs,
   const WorkingViews as_taken = context->Views().AsTaken();
   const Capture& capture = as_taken.capture();
   RequireEnough(capture, settings.pose.min_photos, workspace.Path("poses"));
-  SceneProfile profile =
-      ProfileScene(capture, settings.sh_degree(), settings.Effects(), settings.scene.box);
+  SceneProfile profile = ProfileRun(settings, capture);
   const NormalizedScene& scene = profile.scene;
   const WorkingViews views =
       as_taken.WithGains(profile.gains).InField(scene.field_from_world, scene.ndc);
@@ -212,11 +211,8 @@ Stage ReconstructStage(RunContext* context) {
   stage.refuse_changes = true;
   if (context->settings.start.dry_run) {
     const WorkingViews views = context->Views();
-    // The box does not depend on exposures, and measuring them would read every photo.
-    const SceneProfile profile = ProfileScene(views.capture(), context->settings.sh_degree(),
-                                              context->settings.Effects() + ",exposure=off",
-                                              context->settings.scene.box);
-    const FitPlace place = PlaceOf(context->settings, views, profile.scene);
+    const FitPlace place =
+        PlaceOf(context->settings, views, SceneOfRun(context->settings, views.capture()));
     stage.plan =
         "about " + SizeText(PlanFieldFit(context->settings, place).memory) + " of memory";
     if (const std::string warning = MemoryWarning(context->settings, place); !warning.empty())

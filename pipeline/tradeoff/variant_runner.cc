@@ -17,11 +17,11 @@
 #include "kernels/render/field_renderer.h"
 #include "kernels/scene/common_camera.h"
 #include "pipeline/capture/capture_store.h"
-#include "pipeline/capture/scene_profile.h"
 #include "pipeline/capture/working_views.h"
 #include "pipeline/fields/field_file.h"
 #include "pipeline/images/image_file.h"
 #include "pipeline/program/cpu_time.h"
+#include "pipeline/run/profile_run.h"
 #include "pipeline/stages/field_fit.h"
 #include "pipeline/stages/make_stylizer.h"
 #include "pipeline/stages/photo_metrics.h"
@@ -171,10 +171,7 @@ const VariantRunner::Photos& VariantRunner::PhotosAt(int size) {
   if (photos_ != nullptr && photos_->working_views.photo_size() == size) return *photos_;
   photos_ = std::make_unique<Photos>(Photos{base_->Views().AtSize(size)});
   Photos& p = *photos_;
-  // The box does not depend on exposures, which are known already.
-  p.scene = ProfileScene(p.working_views.capture(), base_->settings.sh_degree(),
-                         base_->settings.Effects() + ",exposure=off", base_->settings.scene.box)
-                .scene;
+  p.scene = SceneOfRun(base_->settings, p.working_views.capture());
   p.working_views = p.working_views.InField(p.scene.field_from_world, p.scene.ndc);
   const std::vector<int> fitted = p.working_views.Training();
   p.pictures.reserve(fitted.size());

@@ -7,6 +7,7 @@
 #include <boost/geometry/index/rtree.hpp>
 #include <cmath>
 #include <map>
+#include <numbers>
 #include <optional>
 
 #include "kernels/base/error.h"
@@ -16,6 +17,8 @@
 
 namespace regrade {
 namespace {
+
+double Longest(const Vec3f& radius) { return std::max({radius.x, radius.y, radius.z}); }
 
 struct Start {
   Vec3f place;
@@ -83,6 +86,23 @@ void AddRandomStarts(const SplatPhotos& photos, const SceneBox& box, uint64_t se
   }
 }
 
+// Adds places of a sphere far outside of the box, evenly, where a photo shows them.
+void AddFarStarts(const SplatPhotos& photos, const SceneBox& box, int64_t count,
+                  std::vector<Start>* starts) {
+  const double radius = kFarRadius * Longest(box.radius);
+  const double turn = std::numbers::pi * (3 - std::sqrt(5.0));  // the golden angle
+  for (int64_t i = 0; i < count; ++i) {
+    const double k = static_cast<double>(i);
+    const double z = 1 - (2 * k + 1) / static_cast<double>(count);
+    const double across = std::sqrt(1 - z * z);
+    const Vec3d way{across * std::cos(turn * k), across * std::sin(turn * k), z};
+    const Vec3f place = box.center + (radius * way).Cast<float>();
+    ColorSum color;
+    for (int v = 0; v < photos.count(); ++v) color.Add(photos[v], place);
+    if (color.count > 0) starts->push_back({place, color.Mean()});
+  }
+}
+
 // Root mean square of the distances to the three nearest others.
 std::vector<double> Spacings(const std::vector<Start>& starts) {
   namespace bg = boost::geometry;
@@ -121,13 +141,16 @@ Splats InitialSplats(const std::vector<TrainingView>& views, const SplatPhotos& 
                      "reconstruct",
                      "check the poses against the photos, or give more photos that overlap by "
                      "two thirds");
+  if (box.spheres && !box.background)
+    AddFarStarts(photos, box, static_cast<int64_t>(kFarShare * static_cast<double>(most)),
+                 &starts);
   if (starts.size() > most) {  // evenly
     std::vector<Start> fewer;
     for (size_t k = 0; k < most; ++k) fewer.push_back(starts[k * starts.size() / most]);
     starts = std::move(fewer);
   }
   const std::vector<double> spacings = Spacings(starts);
-  const double longest = std::max({box.radius.x, box.radius.y, box.radius.z});
+  const double longest = Longest(box.radius);
   Splats splats(std::ssize(starts), 1);
   const float logit = std::log(options.initial_opacity / (1 - options.initial_opacity));
   for (size_t i = 0; i < starts.size(); ++i) {
@@ -149,7 +172,7 @@ double SceneExtent(const SplatPhotos& photos, const SceneBox& box) {
   double farthest = 0;
   for (int v = 0; v < photos.count(); ++v)
     farthest = std::max(farthest, Norm(photos[v].camera.Center() - mean));
-  const double longest = std::max({box.radius.x, box.radius.y, box.radius.z});
+  const double longest = Longest(box.radius);
   return std::max(1.1 * farthest, 0.01 * longest);
 }
 
