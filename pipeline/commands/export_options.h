@@ -27,9 +27,10 @@ struct ExportOptions {
               "writes one style as a LUT for photo and video editors, to the file --out",
           .choices = "colmap-text|colmap|transforms|ply|spz|glb|compressed-ply|points|svox2|"
                      "cube"});
-    bind("name", names,
-         {.help = "only this style, and not the scene as it was; may be given several times. Of "
-                  "cube the style, by default the last one"});
+    bind(
+        "name", names,
+        {.help = "only this style, and not the scene as it was; may be given several times. Of "
+                 "cube the style, by default the last one"});
     bind("resolution", resolution,
          {.unit = "voxels",
           .help = "of svox2: longest side of the grid. 0 copies a uniform field, and takes the "

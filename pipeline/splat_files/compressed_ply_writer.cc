@@ -82,8 +82,7 @@ PackedSplat Prepared(const SplatsView<float>& splats, int64_t i) {
   return to;
 }
 
-std::string HeaderOf(int64_t count, size_t chunks, int basis,
-                     const std::string& comments) {
+std::string HeaderOf(int64_t count, size_t chunks, int basis, const std::string& comments) {
   std::string header = "ply\nformat binary_little_endian 1.0\n" + comments;
   header += "element chunk " + std::to_string(chunks) + "\n";
   for (const auto& [prefix, letters] :
@@ -127,9 +126,7 @@ class Chunks {
       AddHarmonics(splat.sh);
     }
   }
-  std::string Joined() const {
-    return bounds_.Joined() + vertices_.Joined() + harmonics_;
-  }
+  std::string Joined() const { return bounds_.Joined() + vertices_.Joined() + harmonics_; }
 
  private:
   void AddHarmonics(const float* sh) {
@@ -154,10 +151,9 @@ void WriteCompressedPly(const std::string& path, const Splats& splats, bool anti
   Chunks chunks(splats.view());
   for (size_t begin = 0; begin < order.size(); begin += kInChunk)
     chunks.Add(std::span(order).subspan(begin, std::min(kInChunk, order.size() - begin)));
-  WriteFileAtomically(path,
-                      HeaderOf(splats.count(), (order.size() + kInChunk - 1) / kInChunk,
-                               splats.basis, CommentLines(comment, antialiased)) +
-                          chunks.Joined());
+  WriteFileAtomically(path, HeaderOf(splats.count(), (order.size() + kInChunk - 1) / kInChunk,
+                                     splats.basis, CommentLines(comment, antialiased)) +
+                                chunks.Joined());
 }
 
 }  // namespace regrade

@@ -9,8 +9,8 @@ namespace regrade {
 
 // `splats`: at least one, all usable, in the world of the cameras. Written along MortonOrder,
 // so that the splats of a chunk are near each other: 16 bytes each, 72 for 256 of them, and one
-// for each harmonic of a higher degree. `antialiased`: fitted with Mip-Splatting's filter, which
-// a comment says. `comment`: a line of the header.
+// for each harmonic of a higher degree. `antialiased`: fitted with Mip-Splatting's filter,
+// which a comment says. `comment`: a line of the header.
 //
 // Rounded are positions and logarithms of standard deviations (limited to [-20, 20]) to a
 // 1023rd or 2047th of what a chunk spans, colours to a 255th of it, opacities to 1/510,

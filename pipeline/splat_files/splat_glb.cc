@@ -48,10 +48,10 @@ class GlbBuffer {
                                              {"colorSpace", "srgb_rec709_display"},
                                              {"sortingMethod", "cameraDistance"},
                                              {"projection", "perspective"}};
-    const JsonValue mesh = JsonValue::Object{
-        {"attributes", attributes_},
-        {"mode", kPoints},
-        {"extensions", JsonValue::Object{{kExtension, kind}}}};
+    const JsonValue mesh =
+        JsonValue::Object{{"attributes", attributes_},
+                          {"mode", kPoints},
+                          {"extensions", JsonValue::Object{{kExtension, kind}}}};
     const auto list = [](JsonValue::Object only) { return JsonValue::Array{std::move(only)}; };
     return DumpJson(
         JsonValue::Object{
@@ -65,7 +65,7 @@ class GlbBuffer {
             {"accessors", accessors_},
             {"bufferViews", views_},
             {"buffers", list({{"byteLength", static_cast<uint64_t>(bytes_.size())}})}},
-        0);
+        -1);
   }
   const std::string& bytes() const { return bytes_; }
 
@@ -127,8 +127,7 @@ void AddColors(const Splats& splats, const std::string& prefix, GlbBuffer* buffe
       for (int64_t i = 0; i < count; ++i)
         for (int c = 0; c < 3; ++c)
           harmonic.push_back(view.Coefficients(i)[c * view.basis + degree * degree + n]);
-      buffer->Add(Concat(prefix, "SH_DEGREE_", degree, "_COEF_", n), "VEC3", count,
-                      harmonic);
+      buffer->Add(Concat(prefix, "SH_DEGREE_", degree, "_COEF_", n), "VEC3", count, harmonic);
     }
 }
 
@@ -154,8 +153,7 @@ void WriteSplatGlb(const std::string& path, Splats splats) {
   middle.Value(static_cast<uint32_t>(buffer.bytes().size()));
   middle.Value(uint32_t{0x004e4942});  // BIN
   const std::string head = begin.Joined(), between = middle.Joined();
-  WriteFileAtomically(path, std::vector<std::string_view>{head, json, between,
-                                                          buffer.bytes()});
+  WriteFileAtomically(path, std::vector<std::string_view>{head, json, between, buffer.bytes()});
 }
 
 }  // namespace regrade

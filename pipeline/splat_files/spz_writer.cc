@@ -39,7 +39,8 @@ void AppendPosition(const Vec3f& mean, int bits, std::string* bytes) {
     const double fixed =
         std::clamp(std::round(std::ldexp(double{mean[a]}, bits)), -8388608.0, 8388607.0);
     const auto packed = static_cast<uint32_t>(static_cast<int32_t>(fixed));
-    for (int shift = 0; shift < 24; shift += 8) bytes->push_back(static_cast<char>(packed >> shift));
+    for (int shift = 0; shift < 24; shift += 8)
+      bytes->push_back(static_cast<char>(packed >> shift));
   }
 }
 
@@ -85,8 +86,8 @@ void WriteSpz(const std::string& path, const Splats& splats, bool antialiased) {
     SplatRecord record = SplatAt(splats.view(), i);
     turn.Apply(basis, &record);
     AppendPosition(record.splat.mean, bits, &positions);
-    opacities.push_back(static_cast<char>(
-        ToByte(255 / (1 + std::exp(-double{record.splat.opacity_logit})))));
+    opacities.push_back(
+        static_cast<char>(ToByte(255 / (1 + std::exp(-double{record.splat.opacity_logit})))));
     for (int a = 0; a < 3; ++a) {
       colors.push_back(
           static_cast<char>(ToByte(255 * (0.15 * double{record.sh[a * basis]} + 0.5))));
@@ -98,8 +99,8 @@ void WriteSpz(const std::string& path, const Splats& splats, bool antialiased) {
       rotations.push_back(static_cast<char>(rotation >> shift));
     for (int k = 1; k < basis; ++k)
       for (int c = 0; c < 3; ++c)
-        harmonics.push_back(
-            static_cast<char>(HarmonicByte(record.sh[c * basis + k], k < BasisOfDegree(1) ? kStepOf1 : kStepOfOthers)));
+        harmonics.push_back(static_cast<char>(HarmonicByte(
+            record.sh[c * basis + k], k < BasisOfDegree(1) ? kStepOf1 : kStepOfOthers)));
   }
   WriteFileAtomically(path, Gzip(header.Joined() + positions + opacities + colors + scales +
                                  rotations + harmonics));

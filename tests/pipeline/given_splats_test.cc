@@ -206,6 +206,14 @@ TEST(GivenSplats, CamerasOfAFileAreUsedAndTheRunIsContinued) {
   done = Regrade(run);
   ASSERT_EQ(done.code, 0) << done.text;
   EXPECT_EQ(ReadText(folder / "o/field.npz"), field);
+  // What a style leaves as it is keeps the file's bits.
+  const std::string sunset = testing::SourceDir() + "/assets/style_sunset.png";
+  done = Regrade({"stylize", folder / "o", "--style", sunset, "--strength", "0"});
+  ASSERT_EQ(done.code, 0) << done.text;
+  std::string same = ReadText(folder / "o/styles/style_sunset/styled.ply");
+  const size_t comment = same.find("comment restyled by");
+  same.erase(comment, same.find('\n', comment) + 1 - comment);
+  EXPECT_TRUE(same == ReadText(folder / "ball.ply"));
   // Further styles of the folder have their file, too, also where the splats are gone.
   fs::remove(folder / "ball.ply");
   done = Regrade({"stylize", folder / "o", "--style",

@@ -35,13 +35,9 @@ Splats SplatsOfGlb(const std::string& file) {
   EXPECT_EQ(28 + size + number(20 + size), file.size());
   EXPECT_EQ(static_cast<size_t>(json.At("buffers").AsArray()[0].At("byteLength").AsInt()),
             number(20 + size));
-  const JsonValue& primitive =
-      json.At("meshes").AsArray()[0].At("primitives").AsArray()[0];
+  const JsonValue& primitive = json.At("meshes").AsArray()[0].At("primitives").AsArray()[0];
   EXPECT_EQ(primitive.At("mode").AsInt(), 0);
-  EXPECT_EQ(primitive.At("extensions")
-                .At("KHR_gaussian_splatting")
-                .At("colorSpace")
-                .AsString(),
+  EXPECT_EQ(primitive.At("extensions").At("KHR_gaussian_splatting").At("colorSpace").AsString(),
             "srgb_rec709_display");
   const JsonValue::Array& accessors = json.At("accessors").AsArray();
   const auto values = [&](const std::string& name) {
@@ -67,9 +63,9 @@ Splats SplatsOfGlb(const std::string& file) {
   std::vector<std::vector<float>> harmonics;
   for (const auto& [name, index] : primitive.At("attributes").AsObject())
     if (name.find(":SH_DEGREE_") != std::string::npos) {
-      EXPECT_EQ(name, Concat("KHR_gaussian_splatting:SH_DEGREE_",
-                             static_cast<int>(std::sqrt(basis)), "_COEF_",
-                             basis - static_cast<int>(std::pow(int(std::sqrt(basis)), 2))));
+      EXPECT_EQ(name,
+                Concat("KHR_gaussian_splatting:SH_DEGREE_", static_cast<int>(std::sqrt(basis)),
+                       "_COEF_", basis - static_cast<int>(std::pow(int(std::sqrt(basis)), 2))));
       harmonics.push_back(values(name));
       ++basis;
     }
@@ -103,8 +99,7 @@ Splats SplatsOfGlb(const std::string& file) {
 TEST(WriteSplatGlb, IsTheSamePictureForATurnedCamera) {
   const TemporaryFolder folder;
   for (const int basis : {1, 4, 9, 16}) {
-    const Splats splats =
-        testing::CastSplats<float>(testing::RandomSplats(60, basis, 5));
+    const Splats splats = testing::CastSplats<float>(testing::RandomSplats(60, basis, 5));
     WriteSplatGlb(folder / "a.glb", splats);
     Splats in_file = SplatsOfGlb(ReadText(folder / "a.glb"));
     ASSERT_EQ(in_file.basis, basis);

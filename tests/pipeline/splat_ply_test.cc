@@ -182,6 +182,22 @@ TEST(RestyledPly, HigherDegreesBecomeZeroAndDroppedSplatsStay) {
   EXPECT_EQ(after.substr(after.size() - 16 * row, row), before.substr(from, row));
 }
 
+TEST(RestyledPly, SplatsThatAreKeptKeepTheirBytes) {
+  const TemporaryFolder folder;
+  const std::string before = PlyOf(SomeSplats(4));
+  WriteText(folder / "in.ply", before);
+  const std::vector<float> sh(3 * 4 * 20);
+  std::vector<bool> kept(20, true);
+  WriteRestyled(folder / "in.ply", folder / "out.ply", sh, 4, "x", kept);
+  std::string after = ReadText(folder / "out.ply");
+  after.erase(after.find("comment x\n"), 10);
+  EXPECT_TRUE(after == before);
+  kept[3] = false;
+  WriteRestyled(folder / "in.ply", folder / "out.ply", sh, 4, "x", kept);
+  const Splats some = ReadSplats(folder / "out.ply").splats, all = SomeSplats(4);
+  for (size_t k = 0; k < sh.size(); ++k) EXPECT_EQ(some.sh[k], k / 12 == 3 ? 0 : all.sh[k]);
+}
+
 // A vertex of numbers of one digit; integers are read.
 std::string ShortestText() {
   std::string file = "ply\nformat ascii 1.0\nelement vertex 1\n";

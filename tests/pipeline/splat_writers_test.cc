@@ -92,8 +92,8 @@ TEST(WriteSpz, ComesBackWithinHalfAStep) {
       EXPECT_EQ(scene.format, SplatFormat::kSpz);
       EXPECT_EQ(scene.antialiased, antialiased);
       // Means are below 1.2: 22 bits behind the point. A colour's step is 1 / (255 * 0.15).
-      ExpectNear(splats, scene, {0.51 / (1 << 22), 0.51 / 16, 0.51 / 38.25, 0.51 / 32,
-                                 0.51 / 16});
+      ExpectNear(splats, scene,
+                 {0.51 / (1 << 22), 0.51 / 16, 0.51 / 38.25, 0.51 / 32, 0.51 / 16});
     }
 }
 
@@ -136,8 +136,9 @@ TEST(WriteCompressedPly, ComesBackWithinHalfAStepOfWhatAChunkSpans) {
       EXPECT_EQ(scene.format, SplatFormat::kCompressedPly);
       EXPECT_EQ(scene.antialiased, antialiased);
       // Means span 2.4, scales log(8), colours 1.2; a harmonic's byte is 1/32.
-      ExpectNear(splats, scene, {0.51 * 2.4 / 1023, 0.51 * std::log(8.0) / 1023,
-                                 0.51 * 1.2 / 255, 0.51 / 32, 0.51 / 32});
+      ExpectNear(splats, scene,
+                 {0.51 * 2.4 / 1023, 0.51 * std::log(8.0) / 1023, 0.51 * 1.2 / 255, 0.51 / 32,
+                  0.51 / 32});
       const std::string file = ReadText(folder / "a.ply");
       EXPECT_EQ(file.size(), file.find("end_header\n") + 11 + 3 * 72 +
                                  600 * (16 + 3 * static_cast<size_t>(basis - 1)));
