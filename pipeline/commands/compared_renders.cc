@@ -24,7 +24,7 @@ std::vector<Camera> ViewsOf(const std::string& folder, const StoredField& stored
   return cameras;
 }
 
-std::vector<Image> Renders(const RadianceField& field, const std::vector<Camera>& cameras) {
+std::vector<Image> RendersOf(const RadianceField& field, const std::vector<Camera>& cameras) {
   const FieldRenderer renderer(field, Backend::kCpu);
   std::vector<Image> renders;
   for (const Camera& camera : cameras) renders.push_back(renderer.Render(camera).color);

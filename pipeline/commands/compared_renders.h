@@ -16,7 +16,7 @@ namespace regrade {
 std::vector<Camera> ViewsOf(const std::string& folder, const StoredField& stored, int most);
 
 // On the CPU.
-std::vector<Image> Renders(const RadianceField& field, const std::vector<Camera>& cameras);
+std::vector<Image> RendersOf(const RadianceField& field, const std::vector<Camera>& cameras);
 
 // In dB, of all pixels of all pictures together; pictures have the same sizes.
 double PsnrOf(const std::vector<Image>& a, const std::vector<Image>& b);

@@ -37,11 +37,11 @@ void ExportGrid(const ExportOptions& options, const std::string& folder,
     return;
   }
   const std::vector<Camera> cameras = ViewsOf(folder, stored, kComparedViews);
-  const std::vector<Image> before = Renders(stored.field, cameras);
+  const std::vector<Image> before = RendersOf(stored.field, cameras);
   stored.field = ToUniform(stored.field, n, ReadMemoryStatus().available);
   WriteFieldFile(to, stored);
   stored = {};
-  console->Info(grid + "; " + LossText(before, Renders(ReadFieldFile(to).field, cameras)));
+  console->Info(grid + "; " + LossText(before, RendersOf(ReadFieldFile(to).field, cameras)));
 }
 
 void ExportPoints(const ExportOptions& options, const std::string& folder,

@@ -58,8 +58,8 @@ void ExportLut(const ExportOptions& options, const std::string& folder, Console*
   CheckResults(folder, {name});
   const StoredField stored = ReadFieldFile(folder + "/field.npz");
   const std::vector<Camera> cameras = ViewsOf(folder, stored, kViews);
-  const std::vector<Image> before = Renders(stored.field, cameras),
-                           after = Renders(ReadStyledField(folder, style).field, cameras);
+  const std::vector<Image> before = RendersOf(stored.field, cameras),
+                           after = RendersOf(ReadStyledField(folder, style).field, cameras);
   // It is measured on views that it is not fitted to.
   const auto color = [](const Image& image, int64_t i) {
     Vec3d c;

@@ -77,8 +77,8 @@ void ExportSplats(const ExportOptions& options, const std::string& folder,
                             " bytes");
   if (!format.exact) {
     const std::vector<Camera> cameras = ViewsOf(folder, stored, kViews);
-    text +=
-        "; " + LossText(Renders(stored.field, cameras), Renders(ReadBack(to, stored), cameras));
+    text += "; " + LossText(RendersOf(stored.field, cameras),
+                            RendersOf(ReadBack(to, stored), cameras));
   }
   console->Info(text);
 }

@@ -1,6 +1,7 @@
 // What the writers of SPZ and compressed PLY write, read again.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <filesystem>
 
@@ -75,9 +76,14 @@ void ExpectNear(const Splats& written, const SplatScene& scene, const Bounds& bo
 
 TEST(MortonOrder, IsAlongTheCurveAndOfTheMeansAlone) {
   Splats corners(8, 1);
-  for (int i = 0; i < 8; ++i)  // x is the slowest
-    corners.Set(7 - i, {{float(i >> 2 & 1), float(i >> 1 & 1), float(i & 1)}, {}, {}, 0});
-  EXPECT_EQ(MortonOrder(corners.view()), (std::vector<int64_t>{7, 6, 5, 4, 3, 2, 1, 0}));
+  std::vector<int64_t> expected;
+  for (int k = 0; k < 8; ++k) {  // x is the slowest; the indices are mixed
+    expected.push_back((5 * k + 3) % 8);
+    corners.Set(
+        expected.back(),
+        {{-3 + 8.0f * (k >> 2), 2 + 4.0f * (k >> 1 & 1), -7 + 6.0f * (k & 1)}, {}, {}, 0});
+  }
+  EXPECT_EQ(MortonOrder(corners.view()), expected);
   Splats one_place(3, 1);
   EXPECT_EQ(MortonOrder(one_place.view()), (std::vector<int64_t>{0, 1, 2}));
 }
@@ -104,6 +110,13 @@ TEST(WriteSpz, IsAGzipFileOfVersion3) {
   const std::string bytes = Gunzip(ReadText(folder / "a.spz"), 1 << 20, "test");
   EXPECT_EQ(bytes.size(), 16 + 7 * 65u);
   EXPECT_EQ(bytes.substr(0, 16), std::string("NGSP\3\0\0\0\7\0\0\0\3\x16\1\0", 16));
+  int finest[2] = {0, 0};  // of degree 1, and of others
+  for (size_t at = 16 + 7 * 20; at < bytes.size(); ++at) {
+    const size_t k = 1 + (at - 16 - 7 * 20) % 45 / 3;
+    finest[k >= 4] |= static_cast<uint8_t>(bytes[at]);
+  }
+  EXPECT_EQ(finest[0] & 7, 4);
+  EXPECT_EQ(finest[1] & 15, 8);
 }
 
 TEST(WriteSpz, WhatIsBeyondTheFormatIsLimited) {
@@ -124,13 +137,18 @@ TEST(WriteSpz, WhatIsBeyondTheFormatIsLimited) {
   EXPECT_EQ(back.sh[1], 1);  // up and back: -1 in the file
   EXPECT_EQ(back.sh[2], -127 / 128.0f);
   EXPECT_NEAR(back.sh[0], 0.5 / 0.15, 1e-6);
+  splats.mean[0] = 1e9f;
+  WriteSpz(folder / "a.spz", splats, false);
+  const Splats limited = ReadSplats(folder / "a.spz").splats;
+  EXPECT_EQ(std::max(limited.mean[0], limited.mean[3]), (1 << 23) - 1);
 }
 
 TEST(WriteCompressedPly, ComesBackWithinHalfAStepOfWhatAChunkSpans) {
   const TemporaryFolder folder;
   for (const int basis : {1, 4, 9, 16})
     for (const bool antialiased : {false, true}) {
-      const Splats splats = ToWrite(basis);
+      const int64_t chunks = basis == 1 ? 2 : 3, count = basis == 1 ? 512 : 600;
+      const Splats splats = ToWrite(basis, count);
       WriteCompressedPly(folder / "a.ply", splats, antialiased, "a comment");
       const SplatScene scene = ReadSplats(folder / "a.ply");
       EXPECT_EQ(scene.format, SplatFormat::kCompressedPly);
@@ -140,8 +158,8 @@ TEST(WriteCompressedPly, ComesBackWithinHalfAStepOfWhatAChunkSpans) {
                  {0.51 * 2.4 / 1023, 0.51 * std::log(8.0) / 1023, 0.51 * 1.2 / 255, 0.51 / 32,
                   0.51 / 32});
       const std::string file = ReadText(folder / "a.ply");
-      EXPECT_EQ(file.size(), file.find("end_header\n") + 11 + 3 * 72 +
-                                 600 * (16 + 3 * static_cast<size_t>(basis - 1)));
+      EXPECT_EQ(std::ssize(file), static_cast<int64_t>(file.find("end_header\n")) + 11 +
+                                      72 * chunks + count * (16 + 3 * (basis - 1)));
       EXPECT_NE(file.find("comment a comment\n"), std::string::npos);
     }
 }
