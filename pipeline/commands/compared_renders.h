@@ -11,6 +11,8 @@
 
 namespace regrade {
 
+inline constexpr int kComparedViews = 3;  // for one number
+
 // At most `most` views of the output folder, evenly spaced, with 400 pixels on their longer
 // sides, in the frame of `stored`.
 std::vector<Camera> ViewsOf(const std::string& folder, const StoredField& stored, int most);

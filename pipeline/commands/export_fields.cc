@@ -21,8 +21,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr int kComparedViews = 3;
-
 // On a uniform grid.
 void ExportGrid(const ExportOptions& options, const std::string& folder,
                 const std::string& name, StoredField stored, Console* console) {

@@ -1,6 +1,5 @@
 #include "pipeline/commands/export_splats.h"
 
-#include <cmath>
 #include <filesystem>
 #include <vector>
 
@@ -66,7 +65,6 @@ bool IsSplatExport(const std::string& format) { return FindExport(format) != nul
 
 void ExportSplats(const ExportOptions& options, const std::string& folder,
                   const std::string& name, const StoredField& stored, Console* console) {
-  constexpr int kViews = 3;
   const SplatExport& format = *FindExport(options.format);
   const std::string to = options.out + "/" + name + format.ending;
   WriteSplats(options.format, to, stored);
@@ -76,7 +74,7 @@ void ExportSplats(const ExportOptions& options, const std::string& folder,
                                                static_cast<double>(count)),
                             " bytes");
   if (!format.exact) {
-    const std::vector<Camera> cameras = ViewsOf(folder, stored, kViews);
+    const std::vector<Camera> cameras = ViewsOf(folder, stored, kComparedViews);
     text += "; " + LossText(RendersOf(stored.field, cameras),
                             RendersOf(ReadBack(to, stored), cameras));
   }

@@ -12,10 +12,9 @@ namespace regrade {
 // for each harmonic of a higher degree. `antialiased`: fitted with Mip-Splatting's filter,
 // which a comment says. `comment`: a line of the header.
 //
-// Rounded are positions and logarithms of standard deviations (limited to [-20, 20]) to a
-// 1023rd or 2047th of what a chunk spans, colours to a 255th of it, opacities to 1/510,
-// rotations to 0.1 degrees, harmonics to 1/64 (and limited to [-4, 4]). Throws
-// Error(kResources).
+// Rounded are positions and logarithms of standard deviations (limited to [-20, 20]) in steps
+// of a 1023rd or 2047th of what a chunk spans, colours of a 255th of it, opacities of 1/255,
+// rotations (0.1 degrees), harmonics (1/32, limited to [-4, 4]). Throws Error(kResources).
 void WriteCompressedPly(const std::string& path, const Splats& splats, bool antialiased,
                         const std::string& comment);
 
