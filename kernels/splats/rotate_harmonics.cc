@@ -25,6 +25,10 @@ HarmonicsMatrix RotateHarmonics(const Mat3d& rotation) {
         for (size_t b = 0; b < kMaxBasis; ++b)
           matrix[a][b] += weight[i] * 2 * M_PI / kAround * to[a] * from[b];
     }
+  // The sums are accurate to 1e-15.
+  for (auto& row : matrix)
+    for (double& entry : row)
+      if (std::abs(entry - std::round(entry)) < 1e-14) entry = std::round(entry);
   return matrix;
 }
 

@@ -4,7 +4,8 @@
 // sum_i s'_i Gamma_i(d) = sum_j s_j Gamma_j(R^T d), with M_ij the integral of Gamma_i(d)
 // Gamma_j(R^T d) over the sphere, for the Gamma are orthonormal. M is orthogonal and mixes no
 // degrees. Here by a product rule of 4 x 8 points, which is exact to degree 7: harmonics of
-// degree 3 need 6.
+// degree 3 need 6. Whole entries are exact: those of the identity and of half turns about an
+// axis, which only change signs.
 #pragma once
 
 #include <array>

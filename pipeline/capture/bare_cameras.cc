@@ -96,6 +96,25 @@ std::vector<BareCamera> ReadCamerasJson(const std::string& path) {
   return cameras;
 }
 
+void WriteCamerasJson(const std::string& path, const std::vector<BareCamera>& cameras) {
+  const auto list = [](const Vec3d& v) { return JsonValue::Array{v.x, v.y, v.z}; };
+  JsonValue::Array entries;
+  for (const auto& [name, camera] : cameras) {
+    const RigidTransform world_from_camera = camera.camera_from_world.Inverse();
+    JsonValue::Array rotation;
+    for (const Vec3d& row : world_from_camera.rotation.row) rotation.push_back(list(row));
+    entries.push_back(JsonValue::Object{{"id", std::ssize(entries)},
+                                        {"img_name", name},
+                                        {"width", camera.width},
+                                        {"height", camera.height},
+                                        {"position", list(world_from_camera.translation)},
+                                        {"rotation", std::move(rotation)},
+                                        {"fx", camera.fx},
+                                        {"fy", camera.fy}});
+  }
+  WriteJsonFile(path, std::move(entries));
+}
+
 std::vector<BareCamera> ReadBareCameras(const std::string& path) {
   std::error_code none;
   if (fs::is_regular_file(path, none)) return ReadCamerasJson(path);

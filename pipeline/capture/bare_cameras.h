@@ -1,4 +1,5 @@
-// Cameras of a capture whose photos are not there, for scenes that are rendered in their place.
+// Cameras of a capture whose photos are not there, for scenes that are rendered in their place,
+// and for programs that show a scene from them.
 #pragma once
 
 #include <string>
@@ -22,5 +23,9 @@ std::vector<BareCamera> ReadBareCameras(const std::string& path);
 // The cameras of cameras.json: `rotation` is world from camera, `position` the camera's centre,
 // its axes are right, down and front. Throws Error(kInput) with the place in the file.
 std::vector<BareCamera> ReadCamerasJson(const std::string& path);
+
+// Writes such a file. It has no place for principal points, and they are read as the middle of
+// the picture. Throws Error(kResources).
+void WriteCamerasJson(const std::string& path, const std::vector<BareCamera>& cameras);
 
 }  // namespace regrade

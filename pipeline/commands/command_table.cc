@@ -49,8 +49,8 @@ const std::vector<Command>& AllCommands() {
       {"synth", "OUT [OPTIONS]", "writes a synthetic capture with its exact ground truth",
        RunSynth},
       {"export", "DIR --out FOLDER|LOOK.cube [OPTIONS]",
-       "writes photos and poses for COLMAP, nerfstudio and instant-ngp, fields for svox2 or as "
-       "points, or a style as a LUT",
+       "writes photos and poses for COLMAP, nerfstudio and instant-ngp, splats for viewers and "
+       "engines, voxels for svox2 or as points, or a style as a LUT",
        RunExport},
       {"pack", "DIR --out FILE [OPTIONS]",
        "writes a posed capture as one file, for regrade_gpu on a bare GPU machine", RunPack,

@@ -42,6 +42,18 @@ bool DeflatePart(std::string_view bytes, size_t i, std::string* packed) {
   return status == (last ? Z_STREAM_END : Z_OK) && stream.avail_in == 0;
 }
 
+// All bytes as blocks.
+std::string DeflateBlocks(std::string_view bytes) {
+  std::vector<std::string> parts(std::max<size_t>((bytes.size() + kPart - 1) / kPart, 1));
+  bool done = true;
+#pragma omp parallel for schedule(dynamic) reduction(&& : done)
+  for (size_t i = 0; i < parts.size(); ++i) done = done && DeflatePart(bytes, i, &parts[i]);
+  if (!done) throw ResourceError("bytes cannot be compressed: is there memory?");
+  std::string blocks;
+  for (const std::string& part : parts) blocks += part;
+  return blocks;
+}
+
 // `window_bits` selects the container, see inflateInit2.
 std::string Unpack(std::string_view packed, int window_bits, uint64_t max_bytes,
                    const std::string& where) {
@@ -72,17 +84,23 @@ std::string Unpack(std::string_view packed, int window_bits, uint64_t max_bytes,
 }  // namespace
 
 std::string Deflate(std::string_view bytes) {
-  std::vector<std::string> parts(std::max<size_t>((bytes.size() + kPart - 1) / kPart, 1));
-  bool done = true;
-#pragma omp parallel for schedule(dynamic) reduction(&& : done)
-  for (size_t i = 0; i < parts.size(); ++i) done = done && DeflatePart(bytes, i, &parts[i]);
-  if (!done) throw ResourceError("bytes cannot be compressed: is there memory?");
-  std::string packed = kHeader;
-  for (const std::string& part : parts) packed += part;
+  std::string packed = kHeader + DeflateBlocks(bytes);
   const uLong sum = adler32_z(adler32_z(0, nullptr, 0),
                               reinterpret_cast<const Bytef*>(bytes.data()), bytes.size());
   for (int shift = 24; shift >= 0; shift -= 8)
     packed.push_back(static_cast<char>(sum >> shift & 255));
+  return packed;
+}
+
+std::string Gzip(std::string_view bytes) {
+  // The mark, deflate, no flags, no time, the densest level, an unknown system.
+  constexpr std::string_view kBegin("\x1f\x8b\x08\0\0\0\0\0\2\xff", 10);
+  std::string packed = std::string(kBegin) + DeflateBlocks(bytes);
+  const uLong sum = crc32_z(crc32_z(0, nullptr, 0),
+                            reinterpret_cast<const Bytef*>(bytes.data()), bytes.size());
+  for (const uint64_t value : {uint64_t{sum}, uint64_t{bytes.size()}})
+    for (int shift = 0; shift < 32; shift += 8)
+      packed.push_back(static_cast<char>(value >> shift & 255));
   return packed;
 }
 

@@ -117,4 +117,8 @@ bool SaysAntialiased(const PlyHeader& header) {
   return antialiased;
 }
 
+std::string CommentLines(const std::string& comment, bool antialiased) {
+  return "comment " + comment + "\n" + (antialiased ? "comment SplatRenderMode: mip\n" : "");
+}
+
 }  // namespace regrade

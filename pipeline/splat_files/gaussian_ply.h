@@ -43,4 +43,7 @@ SplatScene ReadGaussianPly(std::string_view bytes, const PlyHeader& header, uint
 // "SplatRenderMode: mip", Postshot "antialiased 1". The last such comment counts.
 bool SaysAntialiased(const PlyHeader& header);
 
+// The lines of a header with `comment`, and with what SaysAntialiased looks for.
+std::string CommentLines(const std::string& comment, bool antialiased);
+
 }  // namespace regrade

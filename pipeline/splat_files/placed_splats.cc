@@ -4,25 +4,43 @@
 #include <cmath>
 
 #include "kernels/base/error.h"
+#include "kernels/splats/splat_field.h"
 #include "pipeline/splat_files/splat_record.h"
 
 namespace regrade {
 
 void MoveSplats(const Similarity& target_from_source, Splats* splats) {
   const SplatTurn turn(target_from_source.rotation);
-  const auto log_scale = static_cast<float>(std::log(target_from_source.scale));
+  const double log_scale = std::log(target_from_source.scale);
   const int64_t width = 3 * splats->basis;
   for (int64_t i = 0; i < splats->count(); ++i) {
-    SplatRecord record{splats->view()[i], {}};
-    float* const sh = splats->sh.data() + i * width;
-    std::copy_n(sh, width, record.sh);
+    SplatRecord record = SplatAt(splats->view(), i);
     const Vec3d mean = target_from_source * record.splat.mean.Cast<double>();
     turn.Apply(splats->basis, &record);
     record.splat.mean = mean.Cast<float>();
-    for (int a = 0; a < 3; ++a) record.splat.log_scale[a] += log_scale;
+    Vec3f& scale = record.splat.log_scale;
+    scale = (scale.Cast<double>() + Vec3d{log_scale, log_scale, log_scale}).Cast<float>();
     splats->Set(i, record.splat);
-    std::copy_n(record.sh, width, sh);
+    std::copy_n(record.sh, width, splats->sh.data() + i * width);
   }
+}
+
+Splats WorldSplats(const StoredField& stored) {
+  const SplatsView<float> view = SplatsOf(stored.field);
+  Splats splats(view.count, view.basis);
+  for (int64_t i = 0; i < view.count; ++i) splats.Set(i, view[i]);
+  std::copy_n(view.sh, splats.sh.size(), splats.sh.data());
+  splats.background = view.background;
+  const Similarity& s = stored.field_from_world;
+  const Mat3d back = s.rotation.Transposed();
+  MoveSplats({1 / s.scale, back, -(back * s.translation) / s.scale}, &splats);
+  return splats;
+}
+
+Mat3d HalfTurnAboutX() {
+  Mat3d turn;
+  turn(1, 1) = turn(2, 2) = -1;
+  return turn;
 }
 
 std::vector<float> ColorsBeforeMove(const Similarity& target_from_source,

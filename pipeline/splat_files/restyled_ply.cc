@@ -46,7 +46,8 @@ bool IsGaussianPly(const std::filesystem::path& path) {
 }
 
 void WriteRestyled(const std::filesystem::path& path_in, const std::filesystem::path& path_out,
-                   std::span<const float> sh, int basis, const std::string& comment) {
+                   std::span<const float> sh, int basis, const std::string& comment,
+                   const std::vector<bool>& kept) {
   const std::string where = path_in.string();
   const std::string bytes = ReadWholeFile(where, UINT64_MAX);
   const PlyHeader header = LooksLikePly(bytes) ? ParsePlyHeader(bytes, where) : PlyHeader{};
@@ -57,6 +58,7 @@ void WriteRestyled(const std::filesystem::path& path_in, const std::filesystem::
   const PlyElement& element = header.elements[layout.vertex];
   REGRADE_CHECK(basis >= 1 && sh.size() % (3 * static_cast<size_t>(basis)) == 0);
   const size_t row_size = 3 * static_cast<size_t>(basis), splats = sh.size() / row_size;
+  REGRADE_CHECK(kept.empty() || kept.size() == splats);
   const std::vector<Coefficient> order = InOrderOfTheFile(layout);
   for (const Coefficient& c : order)
     if (IsInteger(element.properties[c.property].type))
@@ -74,13 +76,14 @@ void WriteRestyled(const std::filesystem::path& path_in, const std::filesystem::
   replace(header.after_format, header.after_format,
           "comment " + Printable(comment) + header.line_end);
   PlyRows rows(bytes, header, layout.vertex, where);
-  size_t kept = 0;
+  size_t usable = 0;
   for (uint64_t i = 0; i < element.count; ++i) {
     rows.Next();
     SplatRecord record = RecordOf(rows, layout);
     if (!CleanRecord(layout.basis, &record)) continue;
-    if (kept++ >= splats) break;
-    const std::span<const float> row = sh.subspan((kept - 1) * row_size, row_size);
+    if (usable++ >= splats) break;
+    if (!kept.empty() && kept[usable - 1]) continue;
+    const std::span<const float> row = sh.subspan((usable - 1) * row_size, row_size);
     for (const Coefficient& c : order) {
       const size_t width = static_cast<size_t>(basis);
       const float value = c.k < width ? row[c.channel * width + c.k] : 0.0f;
@@ -90,7 +93,7 @@ void WriteRestyled(const std::filesystem::path& path_in, const std::filesystem::
               PlyCell(value, element.properties[c.property].type, header.encoding));
     }
   }
-  if (kept != splats)
+  if (usable != splats)
     throw InputError(Concat("it no longer has the ", splats, " splats that were read"), where,
                      "has the file been changed? run the same command again");
   file.Write(bytes.data() + copied, bytes.size() - copied);

@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <span>
 #include <string>
+#include <vector>
 
 namespace regrade {
 
@@ -16,11 +17,13 @@ bool IsGaussianPly(const std::filesystem::path& path);
 //
 // `sh` [N, 3, basis]: of the N splats of ReadSplats, in their order and frame, all coefficients
 // of red first. Coefficients of degrees that the file does not have are left out; where it has
-// more, they become 0. The splats that ReadSplats dropped keep their bytes.
+// more, they become 0. The splats that ReadSplats dropped keep their bytes, and so do those of
+// `kept` [N], which may be empty: none.
 //
 // Throws Error(kUsage) for another format or colours of an integer type, Error(kInput) as
 // ReadSplats and if the file no longer has N such splats, Error(kResources) as AtomicFile.
 void WriteRestyled(const std::filesystem::path& path_in, const std::filesystem::path& path_out,
-                   std::span<const float> sh, int basis, const std::string& comment);
+                   std::span<const float> sh, int basis, const std::string& comment,
+                   const std::vector<bool>& kept = {});
 
 }  // namespace regrade

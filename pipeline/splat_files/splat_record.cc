@@ -10,6 +10,12 @@
 
 namespace regrade {
 
+SplatRecord SplatAt(const SplatsView<float>& splats, int64_t i) {
+  SplatRecord record{splats[i], {}};
+  std::copy_n(splats.Coefficients(i), 3 * splats.basis, record.sh);
+  return record;
+}
+
 float LogitOfByte(int byte) {
   const double opacity = std::clamp(byte / 255.0, 0.25 / 255, 1 - 0.25 / 255);
   return static_cast<float>(std::log(opacity / (1 - opacity)));

@@ -18,6 +18,8 @@ struct SplatRecord {
   float sh[3 * kMaxBasis]{};  // [3, basis]: all coefficients of red first
 };
 
+SplatRecord SplatAt(const SplatsView<float>& splats, int64_t i);
+
 // A logit beyond this is as good as this: sigmoid(-kMostLogit) is 2e-9.
 inline constexpr float kMostLogit = 20;
 

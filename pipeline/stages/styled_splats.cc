@@ -1,5 +1,6 @@
 #include "pipeline/stages/styled_splats.h"
 
+#include <algorithm>
 #include <filesystem>
 #include <span>
 #include <vector>
@@ -30,6 +31,17 @@ bool CanCopy(const RunContext& context, const std::string& hash) {
   return IsGaussianPly(context.source) && HashFile(context.source) == hash;
 }
 
+// The splats that the style leaves as they are: outside of its objects all are.
+std::vector<bool> Untouched(const RunContext& context, const Appearance& styled) {
+  const Appearance plain = ReadFieldFile(context.workspace->Path("field.npz")).field.appearance;
+  const int64_t stride = plain.stride();
+  std::vector<bool> untouched;
+  for (int64_t i = 0; i < plain.sh.size(); i += stride)
+    untouched.push_back(
+        std::equal(plain.sh.data() + i, plain.sh.data() + i + stride, styled.sh.data() + i));
+  return untouched;
+}
+
 }  // namespace
 
 bool WriteStyledSplats(const RunContext& context, const StoredField& styled) {
@@ -46,7 +58,7 @@ bool WriteStyledSplats(const RunContext& context, const StoredField& styled) {
                   ColorsBeforeMove(styled.field_from_world,
                                    {colors.sh.data(), static_cast<size_t>(colors.sh.size())},
                                    colors.basis),
-                  colors.basis, CommentOf(context));
+                  colors.basis, CommentOf(context), Untouched(context, colors));
   else
     WriteSplatPly(path, styled, CommentOf(context));
   return true;

@@ -11,9 +11,10 @@ namespace regrade {
 inline constexpr char kStyledSplats[] = "styled.ply";
 
 // Writes it to the style's folder if the run was given a file of splats: of a PLY of Gaussians,
-// as long as it is unchanged, a copy with other colours; of other formats, and where the file
-// is gone, a PLY in its coordinates. A comment in it names the program, the style and the bound
-// of its network. Returns whether it did. Throws Error(kInput), Error(kResources).
+// as long as it is unchanged, a copy with other colours where the style changes them; of other
+// formats, and where the file is gone, a PLY in its coordinates. A comment in it names the
+// program, the style and the bound of its network. Returns whether it did. Throws
+// Error(kInput), Error(kResources).
 bool WriteStyledSplats(const RunContext& context, const StoredField& styled);
 
 }  // namespace regrade

@@ -139,5 +139,23 @@ TEST(RotateHarmonics, ATurnedFunctionIsTheFunctionOfTurnedDirections) {
   }
 }
 
+TEST(RotateHarmonics, HalfTurnsOnlyChangeSigns) {
+  for (int axis = -1; axis < 3; ++axis) {  // -1: the identity
+    Mat3d turn;
+    for (int a = 0; a < 3; ++a) turn(a, a) = axis < 0 || a == axis ? 1 : -1;
+    const HarmonicsMatrix matrix = RotateHarmonics(turn);
+    const Vec3d direction = RandomDirection(3);
+    double turned[16], own[16];
+    ShBasis(16, turn * direction, turned);
+    ShBasis(16, direction, own);
+    for (size_t i = 0; i < 16; ++i)
+      for (size_t j = 0; j < 16; ++j)
+        EXPECT_EQ(matrix[i][j], i != j                   ? 0
+                                : turned[i] * own[i] > 0 ? 1
+                                                         : -1)
+            << axis << " " << i << " " << j;
+  }
+}
+
 }  // namespace
 }  // namespace regrade

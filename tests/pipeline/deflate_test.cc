@@ -29,6 +29,7 @@ TEST(Deflate, BytesOfSeveralPartsComeBack) {
     const std::string bytes = SomeBytes(size), packed = Deflate(bytes);
     EXPECT_TRUE(Inflate(packed, size, "test") == bytes) << size;
     EXPECT_LT(packed.size(), size / 2 + 100);
+    EXPECT_TRUE(Gunzip(Gzip(bytes), size, "test") == bytes) << size;
   }
 }
 

@@ -3,8 +3,10 @@
 
 #include <cmath>
 #include <filesystem>
+#include <utility>
 
 #include "kernels/splats/splat_field.h"
+#include "pipeline/capture/bare_cameras.h"
 #include "pipeline/capture/capture_store.h"
 #include "pipeline/fields/field_file.h"
 #include "pipeline/files/json_file.h"
@@ -90,6 +92,61 @@ void ExpectSamePlaces(const std::string& a, const std::string& b) {
   EXPECT_NE(one.splats.sh, other.splats.sh);
 }
 
+// The scene and its style in each format: one geometry, and what is lost is small and said.
+void ExpectExports(const TemporaryFolder& folder, const Capture& capture) {
+  const std::string run = folder / "o";
+  const SplatScene exact = ReadSplats(folder / "ball.ply");
+  for (const auto& [format, ending] :
+       {std::pair{"ply", ".ply"}, std::pair{"spz", ".spz"}, std::pair{"glb", ".glb"},
+        std::pair{"compressed-ply", ".compressed.ply"}}) {
+    SCOPED_TRACE(format);
+    const std::string to = folder / (std::string("as_") + format);
+    ProgramOutcome done = Regrade({"export", run, "--format", format, "--out", to});
+    ASSERT_EQ(done.code, 0) << done.text;
+    const std::string scene = to + "/field" + ending, style = to + "/sun" + ending;
+    ASSERT_TRUE(fs::exists(scene) && fs::exists(style));
+    const bool rounded =
+        std::string(format) == "spz" || std::string(format) == "compressed-ply";
+    const size_t loss = done.text.find("renders are ");
+    EXPECT_EQ(loss != std::string::npos, rounded) << done.text;
+    if (rounded) {
+      EXPECT_GT(std::stod(done.text.substr(loss + 12)), 36) << done.text;
+    }
+    if (std::string(format) != "glb") {
+      ExpectSamePlaces(scene, style);
+      // In the world of the file that was given.
+      const Splats back = ReadSplats(scene).splats;
+      Vec3d middle, given_middle;
+      for (int64_t i = 0; i < kSplats; ++i) {
+        middle += back.view()[i].mean.Cast<double>() / double(kSplats);
+        given_middle += exact.splats.view()[i].mean.Cast<double>() / double(kSplats);
+      }
+      EXPECT_LT(Norm(middle - given_middle), 1e-2);
+    }
+    const std::vector<BareCamera> cameras = ReadCamerasJson(to + "/cameras.json");
+    ASSERT_EQ(cameras.size(), capture.views.size());
+    EXPECT_LT(Norm(cameras[1].camera.Center() - capture.views[1].camera.Center()), 1e-9);
+    EXPECT_EQ(cameras[1].name, capture.views[1].file);
+    const JsonValue turn = ReadJsonFile(to + "/transform.json").At("world_from_file");
+    const bool is_ply = std::string(ending).ends_with("ply");
+    EXPECT_EQ(turn.AsArray()[1].AsArray()[1].AsDouble(), is_ply ? 1 : -1);
+
+    done = Regrade({"export", run, "--format", format, "--name", "sun", "--out", to + "s"});
+    ASSERT_EQ(done.code, 0) << done.text;
+    EXPECT_FALSE(fs::exists(to + "s/field" + ending));
+    EXPECT_TRUE(ReadText(to + "s/sun" + ending) == ReadText(style));
+  }
+  const std::string to = folder / "not";
+  ProgramOutcome done = Regrade({"export", run, "--format", "points", "--out", to});
+  EXPECT_EQ(done.code, static_cast<int>(ExitCode::kUsage));
+  EXPECT_NE(done.text.find("use --format ply"), std::string::npos) << done.text;
+  done = Regrade({"export", run, "--format", "ply", "--name", "moon", "--out", to});
+  EXPECT_EQ(done.code, static_cast<int>(ExitCode::kInput));
+  done = Regrade({"export", run, "--name", "sun", "--out", to});
+  EXPECT_EQ(done.code, static_cast<int>(ExitCode::kUsage));
+  EXPECT_FALSE(fs::exists(to));
+}
+
 TEST(GivenSplats, ViewsArePlacedAndTheStyleIsWrittenBack) {
   const TemporaryFolder folder;
   WriteBall(folder / "ball.ply");
@@ -126,6 +183,7 @@ TEST(GivenSplats, ViewsArePlacedAndTheStyleIsWrittenBack) {
   const std::string header = ReadText(styled).substr(0, 300);
   EXPECT_NE(header.find("comment a ball"), std::string::npos) << header;
   EXPECT_NE(header.find("style sun, Lipschitz bound"), std::string::npos) << header;
+  ExpectExports(folder, capture);
 }
 
 TEST(GivenSplats, CamerasOfAFileAreUsedAndTheRunIsContinued) {
@@ -148,6 +206,14 @@ TEST(GivenSplats, CamerasOfAFileAreUsedAndTheRunIsContinued) {
   done = Regrade(run);
   ASSERT_EQ(done.code, 0) << done.text;
   EXPECT_EQ(ReadText(folder / "o/field.npz"), field);
+  // What a style leaves as it is keeps the file's bits.
+  const std::string sunset = testing::SourceDir() + "/assets/style_sunset.png";
+  done = Regrade({"stylize", folder / "o", "--style", sunset, "--strength", "0"});
+  ASSERT_EQ(done.code, 0) << done.text;
+  std::string same = ReadText(folder / "o/styles/style_sunset/styled.ply");
+  const size_t comment = same.find("comment restyled by");
+  same.erase(comment, same.find('\n', comment) + 1 - comment);
+  EXPECT_TRUE(same == ReadText(folder / "ball.ply"));
   // Further styles of the folder have their file, too, also where the splats are gone.
   fs::remove(folder / "ball.ply");
   done = Regrade({"stylize", folder / "o", "--style",

@@ -1,11 +1,11 @@
 // SPZ, compressed PLY and .splat: against numbers worked out by hand, and against pictures.
 #include <gtest/gtest.h>
-#include <zlib.h>
 
 #include <cmath>
 
 #include "kernels/base/random.h"
 #include "kernels/splats/render_picture.h"
+#include "pipeline/files/deflate.h"
 #include "pipeline/files/zstd.h"
 #include "pipeline/splat_files/read_splats.h"
 #include "tests/support/data.h"
@@ -28,20 +28,6 @@ SplatScene Read(const std::string& bytes) {
   const TemporaryFolder folder;
   testing::WriteText(folder / "a", bytes);
   return ReadSplats(folder / "a");
-}
-
-std::string Gzip(const std::string& bytes) {
-  z_stream stream{};
-  EXPECT_EQ(deflateInit2(&stream, 6, Z_DEFLATED, 16 + MAX_WBITS, 8, Z_DEFAULT_STRATEGY), Z_OK);
-  std::string packed(deflateBound(&stream, bytes.size()) + 32, '\0');
-  stream.next_in = reinterpret_cast<Bytef*>(const_cast<char*>(bytes.data()));
-  stream.avail_in = static_cast<uInt>(bytes.size());
-  stream.next_out = reinterpret_cast<Bytef*>(packed.data());
-  stream.avail_out = static_cast<uInt>(packed.size());
-  EXPECT_EQ(deflate(&stream, Z_FINISH), Z_STREAM_END);
-  packed.resize(packed.size() - stream.avail_out);
-  deflateEnd(&stream);
-  return packed;
 }
 
 void ExpectNear(const std::vector<float>& values, const std::vector<double>& expected) {

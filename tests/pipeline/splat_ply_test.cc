@@ -44,27 +44,28 @@ void ExpectSame(const Splats& a, const Splats& b) {
   EXPECT_EQ(a.basis, b.basis);
 }
 
-// Places and colours go through the turn of the identity in double, which rounds.
+// Bit for bit, but for the lengths of quaternions.
 TEST(SplatFiles, WhatTheWriterWritesComesBack) {
   const TemporaryFolder folder;
-  for (const int basis : {1, 4, 9}) {
-    const Splats splats = SomeSplats(basis, 50);
-    const StoredField stored{FieldOfSplats(splats, {{}, {}, {1, 1, 1}}, 0.2f, false), {}, {}};
-    WriteSplatPly(folder / "field.ply", stored, "a comment");
-    const SplatScene scene = ReadSplats(folder / "field.ply");
-    EXPECT_EQ(scene.format, SplatFormat::kPly);
-    EXPECT_EQ(scene.records, 50);
-    EXPECT_EQ(scene.dropped, 0);
-    EXPECT_TRUE(scene.ignored.empty());
-    EXPECT_TRUE(scene.notes.empty());
-    EXPECT_EQ(scene.splats.basis, basis);
-    EXPECT_EQ(scene.splats.mean, splats.mean);
-    EXPECT_EQ(scene.splats.log_scale, splats.log_scale);
-    EXPECT_EQ(scene.splats.opacity_logit, splats.opacity_logit);
-    ASSERT_EQ(scene.splats.sh.size(), splats.sh.size());
-    for (size_t i = 0; i < splats.sh.size(); ++i)
-      EXPECT_NEAR(scene.splats.sh[i], splats.sh[i], 1e-6) << i;
-  }
+  for (const int basis : {1, 4, 9, 16})
+    for (const bool antialiased : {false, true}) {
+      const Splats splats = SomeSplats(basis, 50);
+      const StoredField stored{
+          FieldOfSplats(splats, {{}, {}, {1, 1, 1}}, 0.2f, antialiased), {}, {}};
+      WriteSplatPly(folder / "field.ply", stored, "a comment");
+      const SplatScene scene = ReadSplats(folder / "field.ply");
+      EXPECT_EQ(scene.format, SplatFormat::kPly);
+      EXPECT_EQ(scene.antialiased, antialiased);
+      EXPECT_EQ(scene.records, 50);
+      EXPECT_EQ(scene.dropped, 0);
+      EXPECT_TRUE(scene.ignored.empty());
+      EXPECT_TRUE(scene.notes.empty());
+      EXPECT_EQ(scene.splats.basis, basis);
+      EXPECT_EQ(scene.splats.mean, splats.mean);
+      EXPECT_EQ(scene.splats.log_scale, splats.log_scale);
+      EXPECT_EQ(scene.splats.opacity_logit, splats.opacity_logit);
+      EXPECT_EQ(scene.splats.sh, splats.sh);
+    }
 }
 
 TEST(SplatFiles, AnyEncodingTypeAndOrderIsTheSame) {
@@ -179,6 +180,22 @@ TEST(RestyledPly, HigherDegreesBecomeZeroAndDroppedSplatsStay) {
   const size_t row = sizeof(float) * (3 + 27 + 1 + 3 + 4),
                from = before.size() - 16 * row;  // the row of the splat that is not drawn
   EXPECT_EQ(after.substr(after.size() - 16 * row, row), before.substr(from, row));
+}
+
+TEST(RestyledPly, SplatsThatAreKeptKeepTheirBytes) {
+  const TemporaryFolder folder;
+  const std::string before = PlyOf(SomeSplats(4));
+  WriteText(folder / "in.ply", before);
+  const std::vector<float> sh(3 * 4 * 20);
+  std::vector<bool> kept(20, true);
+  WriteRestyled(folder / "in.ply", folder / "out.ply", sh, 4, "x", kept);
+  std::string after = ReadText(folder / "out.ply");
+  after.erase(after.find("comment x\n"), 10);
+  EXPECT_TRUE(after == before);
+  kept[3] = false;
+  WriteRestyled(folder / "in.ply", folder / "out.ply", sh, 4, "x", kept);
+  const Splats some = ReadSplats(folder / "out.ply").splats, all = SomeSplats(4);
+  for (size_t k = 0; k < sh.size(); ++k) EXPECT_EQ(some.sh[k], k / 12 == 3 ? 0 : all.sh[k]);
 }
 
 // A vertex of numbers of one digit; integers are read.

@@ -316,8 +316,11 @@ TEST(Points, AreWrittenInTheCapturesWorldAndLabelled) {
   Synth(folder);
   ASSERT_EQ(Regrade(RunOf(folder, "e", {"--style", Asset("sunset")}, "voxels")).code, 0);
   const ProgramOutcome done =
-      Regrade({"export", folder / "e", "--format", "ply", "--out", folder / "p"});
+      Regrade({"export", folder / "e", "--format", "points", "--out", folder / "p"});
   ASSERT_EQ(done.code, 0) << done.text;
+  const std::string refused =
+      Regrade({"export", folder / "e", "--format", "ply", "--out", folder / "q"}).text;
+  EXPECT_NE(refused.find("use --format points"), std::string::npos) << refused;
   for (const char* name : {"p/field.ply", "p/style_sunset.ply"}) {
     const std::string ply = ReadText(folder / name);
     EXPECT_EQ(ply.substr(0, 4), "ply\n");

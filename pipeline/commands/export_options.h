@@ -1,0 +1,44 @@
+// What `regrade export` is asked for.
+#pragma once
+
+#include <string>
+#include <vector>
+
+namespace regrade {
+
+struct ExportOptions {
+  std::string out;
+  std::string format = "colmap-text";
+  std::vector<std::string> names;
+  int resolution = 0;
+  bool dry_run = false;
+
+  template <typename Bind>
+  void Describe(Bind& bind) {
+    bind("out", out, {.help = "the folder to write, a new or empty one; of cube the file"});
+    bind("format", format,
+         {.help =
+              "colmap-text and colmap write images/ and sparse/; transforms writes images/ "
+              "and transforms.json for nerfstudio and instant-ngp. ply, spz, glb and "
+              "compressed-ply write a scene of splats and each style for viewers, editors and "
+              "engines: field.EXT and NAME.EXT, cameras.json, and transform.json, which leads "
+              "back to the photos' world. Of voxels svox2 writes .npz on uniform grids, and "
+              "points PLY files of points with colours, approximately on the surfaces. cube "
+              "writes one style as a LUT for photo and video editors, to the file --out",
+          .choices = "colmap-text|colmap|transforms|ply|spz|glb|compressed-ply|points|svox2|"
+                     "cube"});
+    bind(
+        "name", names,
+        {.help = "only this style, and not the scene as it was; may be given several times. Of "
+                 "cube the style, by default the last one"});
+    bind("resolution", resolution,
+         {.unit = "voxels",
+          .help = "of svox2: longest side of the grid. 0 copies a uniform field, and takes the "
+                  "finest level of an adaptive one, up to 512; memory grows with its cube",
+          .min = 0,
+          .max = 1290});
+    bind("dry-run", dry_run, {.help = "prints what would be written, and does nothing"});
+  }
+};
+
+}  // namespace regrade

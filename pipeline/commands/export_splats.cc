@@ -1,0 +1,97 @@
+#include "pipeline/commands/export_splats.h"
+
+#include <filesystem>
+#include <vector>
+
+#include "kernels/base/error.h"
+#include "kernels/splats/splat_field.h"
+#include "pipeline/capture/bare_cameras.h"
+#include "pipeline/commands/command.h"
+#include "pipeline/commands/compared_renders.h"
+#include "pipeline/files/json_file.h"
+#include "pipeline/splat_files/compressed_ply_writer.h"
+#include "pipeline/splat_files/placed_splats.h"
+#include "pipeline/splat_files/read_splats.h"
+#include "pipeline/splat_files/splat_glb.h"
+#include "pipeline/splat_files/splat_ply.h"
+#include "pipeline/splat_files/spz_writer.h"
+
+namespace regrade {
+namespace {
+
+constexpr char kComment[] = "splats by regrade, in the world of the photos' poses";
+
+struct SplatExport {
+  const char *format, *ending;
+  bool turned;  // to right, up and back
+  bool exact;   // holds floats
+};
+constexpr SplatExport kSplatExports[] = {{"ply", ".ply", false, true},
+                                         {"spz", ".spz", true, false},
+                                         {"glb", ".glb", true, true},
+                                         {"compressed-ply", ".compressed.ply", false, false}};
+
+const SplatExport* FindExport(const std::string& format) {
+  for (const SplatExport& known : kSplatExports)
+    if (format == known.format) return &known;
+  return nullptr;
+}
+
+void WriteSplats(const std::string& format, const std::string& path,
+                 const StoredField& stored) {
+  const bool antialiased = stored.field.geometry->splats.antialiased;
+  if (format == "ply")
+    WriteSplatPly(path, stored, kComment);
+  else if (format == "spz")
+    WriteSpz(path, WorldSplats(stored), antialiased);
+  else if (format == "glb")
+    WriteSplatGlb(path, WorldSplats(stored));
+  else
+    WriteCompressedPly(path, WorldSplats(stored), antialiased, kComment);
+}
+
+// What a reader of `path` renders in place of `stored`.
+RadianceField ReadBack(const std::string& path, const StoredField& stored) {
+  SplatScene scene = ReadSplats(path);
+  MoveSplats(stored.field_from_world, &scene.splats);
+  scene.splats.background = stored.field.background;
+  return FieldOfSplats(scene.splats, stored.field.geometry->frame, stored.field.near_clip,
+                       scene.antialiased);
+}
+
+}  // namespace
+
+bool IsSplatExport(const std::string& format) { return FindExport(format) != nullptr; }
+
+void ExportSplats(const ExportOptions& options, const std::string& folder,
+                  const std::string& name, const StoredField& stored, Console* console) {
+  const SplatExport& format = *FindExport(options.format);
+  const std::string to = options.out + "/" + name + format.ending;
+  WriteSplats(options.format, to, stored);
+  const int64_t count = stored.field.geometry->num_voxels();
+  std::string text = Concat("wrote ", to, ": ", count, " splats of ",
+                            Format("%.1f", static_cast<double>(std::filesystem::file_size(to)) /
+                                               static_cast<double>(count)),
+                            " bytes");
+  if (!format.exact) {
+    const std::vector<Camera> cameras = ViewsOf(folder, stored, kComparedViews);
+    text += "; " + LossText(RendersOf(stored.field, cameras),
+                            RendersOf(ReadBack(to, stored), cameras));
+  }
+  console->Info(text);
+}
+
+void WriteCamerasAndTransform(const ExportOptions& options, const std::string& folder) {
+  std::vector<BareCamera> cameras;
+  for (const CaptureView& view : ReadPosedCapture(folder).views)
+    cameras.push_back({view.file, view.camera.Undistorted()});
+  WriteCamerasJson(options.out + "/cameras.json", cameras);
+  const Mat3d turn = FindExport(options.format)->turned ? HalfTurnAboutX() : Mat3d();
+  JsonValue::Array rows;
+  for (const Vec3d& row : turn.row) rows.push_back(JsonValue::Array{row.x, row.y, row.z, 0.0});
+  rows.push_back(JsonValue::Array{0.0, 0.0, 0.0, 1.0});
+  WriteJsonFile(options.out + "/transform.json",
+                JsonValue::Object{{"world_from_file", std::move(rows)}});
+}
+
+}  // namespace regrade
