@@ -1,9 +1,10 @@
 // One optimizer step of a splat, the same body on both processors.
 //
 // EQ(splat-adam): Adam (see EQ(adam); epsilon 1e-15) on every value of a splat, with a rate for
-// each attribute, on the gradient of the picture's loss and of EQ(splat-regularizers),
-// Kheradmand et al. 2024, eq. 10:  lambda_o mean sigmoid(x_i) + lambda_s mean exp(l_ik)  over
-// all splats.
+// each attribute, that of means times max(1, |mean - middle| / reach), so that far splats move
+// as far in pictures as near ones; on the gradient of the picture's loss and of
+// EQ(splat-regularizers), Kheradmand et al. 2024, eq. 10:  lambda_o mean sigmoid(x_i) +
+// lambda_s mean exp(l_ik)  over all splats.
 //
 // EQ(splat-color-bound): after the step, a coefficient of degree 0 is projected into
 // [-mean_bound, mean_bound], by default a mean colour in [0, 1], and every other one into
@@ -19,6 +20,7 @@
 
 #include <cmath>
 #include <cstdint>
+#include <limits>
 
 #include "kernels/base/random.h"
 #include "kernels/base/random_streams.h"
@@ -33,9 +35,17 @@ inline constexpr float kDeadOpacity = 0.005f;  // below it, a splat is moved els
 inline constexpr float kNoiseOpacity = 0.25f;  // from it on, none is added
 
 struct SplatRates {
-  float mean = 0;  // world units
+  float mean = 0;  // world units, within `reach` of `middle`
   float log_scale = 0, quaternion = 0, opacity_logit = 0;
   float sh_mean = 0, sh_rest = 0;  // of degree 0, and of the others
+  Vec3f middle{0, 0, 0};
+  float reach = std::numeric_limits<float>::infinity();
+
+  HD float MeanAt(const float* place) const {
+    const Vec3f away = Vec3f{place[0], place[1], place[2]} - middle;
+    const float far = Norm(away) / reach;
+    return far > 1 ? mean * far : mean;
+  }
 };
 
 struct SplatUpdate {
@@ -121,11 +131,12 @@ HD inline bool UpdateShape(const SplatUpdate& update, int64_t i, const Splat<flo
   const float opacity = exp(LogSigmoid(to.value.opacity_logit[i]));
   step(d.opacity_logit + update.opacity_weight * opacity * (1 - opacity), rates.opacity_logit,
        i, &SplatPointers::opacity_logit);
+  const float rate_mean = rates.MeanAt(to.value.mean + 3 * i);
   for (int a = 0; a < 3; ++a) {
     const int64_t k = 3 * i + a;
     const float log_scale = to.value.log_scale[k];
     const float scale = exp(log_scale < 20.0f ? log_scale : 20.0f) * LogScaleCounts(log_scale);
-    step(d.mean[a], rates.mean, k, &SplatPointers::mean);
+    step(d.mean[a], rate_mean, k, &SplatPointers::mean);
     step(d.log_scale[a] + update.scale_weight * scale, rates.log_scale, k,
          &SplatPointers::log_scale);
   }

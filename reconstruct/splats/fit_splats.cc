@@ -31,7 +31,9 @@ class SplatFitter {
     const SplatOptions render = SplatOptionsFor(box.near_clip, box.radius, options.antialiased);
     engine_ =
         backend == Backend::kCuda ? MakeCudaSplatEngine(render) : MakeCpuSplatEngine(render);
-    extent_ = static_cast<float>(SceneExtent(photos_, box));
+    const CameraSpread cameras = SpreadOf(photos_, box);
+    middle_ = cameras.middle.Cast<float>();
+    extent_ = static_cast<float>(cameras.extent);
     most_ = static_cast<int64_t>(options.thousands * 1000);
     // On three captures of few photos, 1500 steps gained 0.8 dB and 0.02 of SSIM by this.
     const float fewer =
@@ -122,14 +124,19 @@ class SplatFitter {
     const float part = static_cast<float>(step_) / static_cast<float>(options_.steps);
     const float rate = options_.rate_mean *
                        std::pow(options_.rate_mean_end / options_.rate_mean, part) * extent_;
+    const bool is_long = options_.steps >= options_.long_from;
+    const float fall =
+        is_long ? std::pow(options_.fall, std::max(0.0f, 2 * part - 1)) : 1.0f;  // of rates
     update.rates = {rate,
-                    options_.rate_scale,
-                    options_.rate_quaternion,
-                    options_.rate_opacity,
-                    options_.rate_color,
-                    options_.rate_view};
+                    options_.rate_scale * fall,
+                    options_.rate_quaternion * fall,
+                    options_.rate_opacity * fall,
+                    options_.rate_color * fall,
+                    options_.rate_view * fall,
+                    middle_,
+                    extent_};
     update.noise = options_.noise * rate;
-    if (options_.steps >= options_.dropout_from)
+    if (is_long)
       step.dropout =
           SplatDropout(options_.dropout * part, options_.seed, static_cast<uint64_t>(step_));
     const float splats = static_cast<float>(engine_->count());
@@ -221,6 +228,7 @@ class SplatFitter {
   SplatPhotos photos_;
   std::optional<SplatPhotos> small_;
   std::unique_ptr<SplatEngine> engine_;
+  Vec3f middle_;  // of the cameras
   float extent_ = 1;
   int64_t most_ = 0;
   int step_ = 0, round_ = -1;

@@ -165,15 +165,15 @@ Splats InitialSplats(const std::vector<TrainingView>& views, const SplatPhotos& 
   return splats;
 }
 
-double SceneExtent(const SplatPhotos& photos, const SceneBox& box) {
-  Vec3d mean{};
-  for (int v = 0; v < photos.count(); ++v) mean += photos[v].camera.Center();
-  mean = mean / photos.count();
+CameraSpread SpreadOf(const SplatPhotos& photos, const SceneBox& box) {
+  Vec3d middle{};
+  for (int v = 0; v < photos.count(); ++v) middle += photos[v].camera.Center();
+  middle = middle / photos.count();
   double farthest = 0;
   for (int v = 0; v < photos.count(); ++v)
-    farthest = std::max(farthest, Norm(photos[v].camera.Center() - mean));
+    farthest = std::max(farthest, Norm(photos[v].camera.Center() - middle));
   const double longest = Longest(box.radius);
-  return std::max(1.1 * farthest, 0.01 * longest);
+  return {middle, std::max(1.1 * farthest, 0.01 * longest)};
 }
 
 }  // namespace regrade

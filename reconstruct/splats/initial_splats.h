@@ -25,8 +25,11 @@ inline constexpr double kFarShare = 0.125, kFarRadius = 6;
 Splats InitialSplats(const std::vector<TrainingView>& views, const SplatPhotos& photos,
                      const SceneBox& box, const SplatFitOptions& options);
 
-// 1.1 times the largest distance of a camera from the cameras' mean, as the published rates
-// expect; at least a hundredth of the box.
-double SceneExtent(const SplatPhotos& photos, const SceneBox& box);
+struct CameraSpread {
+  Vec3d middle;       // the cameras' mean
+  double extent = 0;  // 1.1 times the largest distance from it, as the published rates expect;
+                      // at least a hundredth of the box
+};
+CameraSpread SpreadOf(const SplatPhotos& photos, const SceneBox& box);
 
 }  // namespace regrade

@@ -17,7 +17,7 @@ struct SplatFitOptions {
   int sh_degree = 2;
   float ssim_weight = 0.2f;
   float opacity_weight = 0.03f, scale_weight = 0.03f;
-  // Of Adam. That of means is over the scene's extent, and falls exponentially.
+  // Of Adam. That of means is over the cameras' extent, and falls exponentially.
   float rate_mean = 1.6e-4f, rate_mean_end = 1.6e-6f;
   float rate_scale = 5e-3f, rate_quaternion = 1e-3f, rate_opacity = 5e-2f;
   float rate_color = 2.5e-3f, rate_view = 1.25e-4f;
@@ -28,10 +28,11 @@ struct SplatFitOptions {
   float growth = 0.05f;  // of the splats, each time
   float degree_each = 1.0f / 30;
   float small_until = 0.3f;  // at half the photos' size
-  // The share of EQ(splat-dropout) rises to this, in fits of so many steps or more: shorter
-  // ones have not begun to learn their photos by heart.
-  float dropout = 0.1f;
-  int dropout_from = 4000;
+  // Fits of so many steps or more would learn their photos by heart: in them the share of
+  // EQ(splat-dropout) rises to `dropout`, and in their second half all rates fall to `fall` of
+  // what they were, so that what this stirs settles.
+  int long_from = 4000;
+  float dropout = 0.1f, fall = 0.1f;
   bool antialiased = false;
   uint64_t seed = 0;
 

@@ -139,6 +139,22 @@ TEST(UpdateSplat, AGradientThatIsNotFiniteChangesNothing) {
   EXPECT_EQ(splats.sh[5], 0);
 }
 
+// A first step of Adam is its rate.
+TEST(UpdateSplat, FarMeansMoveInProportionToTheirDistance) {
+  for (const float place : {6.0f, 7.0f, 9.0f, 15.0f}) {
+    Splats splats(1, 1), first(1, 1), second(1, 1);
+    splats.mean = {place, 0, 0};
+    splats.quaternion[0] = 1;
+    SplatUpdate update;
+    update.rates = {.mean = 0.02f, .middle = {5, 0, 0}, .reach = 2};
+    update.SetStep(0);
+    EXPECT_TRUE(UpdateShape(update, 0, {.mean = {-3, 0, 0}},
+                            {PointersOf(&splats), PointersOf(&first), PointersOf(&second)}));
+    const float far = std::max(place - 5, 2.0f);
+    EXPECT_NEAR(splats.mean[0], place + 0.01f * far, 1e-5f) << place;
+  }
+}
+
 // Of the losses lambda_o sum sigmoid(x) and lambda_s sum exp(l), by differences in double;
 // Adam's first moment after a step from 0 is a tenth of the gradient.
 TEST(UpdateSplat, RegularisersHaveTheirGradient) {
