@@ -86,7 +86,35 @@ void AddRandomStarts(const SplatPhotos& photos, const SceneBox& box, uint64_t se
   }
 }
 
-// Adds places of a sphere far outside of the box, evenly, where a photo shows them.
+// The colour that most photos of a place agree on, as they do if it is there and seen; nothing
+// if fewer than three photos show it, or fewer than half of them agree.
+std::optional<Vec3f> AgreedColor(const SplatPhotos& photos, const Vec3f& place) {
+  std::vector<Vec3f> colors;
+  for (int v = 0; v < photos.count(); ++v) {
+    ColorSum one;
+    one.Add(photos[v], place);
+    if (one.count > 0) colors.push_back(one.Mean());
+  }
+  if (colors.size() < kFewestAgreeing) return {};
+  Vec3f median;
+  for (int c = 0; c < 3; ++c) {
+    const auto middle = colors.begin() + std::ssize(colors) / 2;
+    std::nth_element(colors.begin(), middle, colors.end(),
+                     [c](const Vec3f& x, const Vec3f& y) { return x[c] < y[c]; });
+    median[c] = (*middle)[c];
+  }
+  const auto agrees = [&median](const Vec3f& color) {
+    float most = 0;
+    for (int c = 0; c < 3; ++c) most = std::max(most, std::abs(color[c] - median[c]));
+    return most < kAgreement;
+  };
+  const size_t agreeing = static_cast<size_t>(std::ranges::count_if(colors, agrees));
+  if (agreeing < kFewestAgreeing || 2 * agreeing < colors.size()) return {};
+  return median;
+}
+
+// Adds places of a sphere far outside of the box, evenly, where photos agree on a colour: the
+// sky, and what is so far that they see it in one direction.
 void AddFarStarts(const SplatPhotos& photos, const SceneBox& box, int64_t count,
                   std::vector<Start>* starts) {
   const double radius = kFarRadius * Longest(box.radius);
@@ -97,9 +125,7 @@ void AddFarStarts(const SplatPhotos& photos, const SceneBox& box, int64_t count,
     const double across = std::sqrt(1 - z * z);
     const Vec3d way{across * std::cos(turn * k), across * std::sin(turn * k), z};
     const Vec3f place = box.center + (radius * way).Cast<float>();
-    ColorSum color;
-    for (int v = 0; v < photos.count(); ++v) color.Add(photos[v], place);
-    if (color.count > 0) starts->push_back({place, color.Mean()});
+    if (const auto color = AgreedColor(photos, place)) starts->push_back({place, *color});
   }
 }
 

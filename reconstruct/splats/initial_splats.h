@@ -15,12 +15,15 @@ namespace regrade {
 inline constexpr size_t kLeastPoints = 50;
 inline constexpr size_t kRandomStarts = 20000;
 // Of a box with surroundings, a share of the splats may begin on a sphere of so many of the
-// box's longest half side: what is too far for points, and what few points show.
+// box's longest half side, where as many photos agree on a colour up to a difference in each
+// channel: what is too far for points.
 inline constexpr double kFarShare = 0.125, kFarRadius = 6;
+inline constexpr size_t kFewestAgreeing = 3;
+inline constexpr float kAgreement = 0.06f;
 
 // One for each point that the photos saw, of the mean colour of the pixels that show it, round,
 // as wide as initial_scale times the root mean square of the distances to its three nearest
-// neighbours; with surroundings also one for each direction, evenly, in which a photo looks.
+// neighbours; with surroundings also one for each direction, evenly, in which photos agree.
 // Harmonics of degree 0. Throws Error(kScene) if no place is seen by two photos.
 Splats InitialSplats(const std::vector<TrainingView>& views, const SplatPhotos& photos,
                      const SceneBox& box, const SplatFitOptions& options);

@@ -141,6 +141,19 @@ TEST(SceneProfile, H153_H156_FarSurroundingsUseSpheres) {
       ExitCode::kUsage, "alpha");
 }
 
+TEST(SceneProfile, FarSurroundingsOfSplatsLeaveTheBoxAsItIs) {
+  const SceneProfile near = ProfileScene(CaptureSeenAllRound(0), 2, "exposure=off", {}, true);
+  EXPECT_FALSE(near.scene.box.spheres);
+  const SceneProfile far = ProfileScene(CaptureSeenAllRound(5), 2, "exposure=off", {}, true);
+  EXPECT_TRUE(far.scene.box.spheres);
+  EXPECT_EQ(far.effects[3].on, true);
+  const SceneProfile without =
+      ProfileScene(CaptureSeenAllRound(5), 2, "background=off,exposure=off", {}, true);
+  EXPECT_FALSE(without.scene.box.spheres);
+  EXPECT_EQ(without.scene.box.radius, far.scene.box.radius);
+  EXPECT_EQ(without.scene.field_from_world.scale, far.scene.field_from_world.scale);
+}
+
 // What is given is not measured.
 TEST(SceneProfile, OptionsOfTheBoxReplaceMeasurements) {
   BoxOptions box;
