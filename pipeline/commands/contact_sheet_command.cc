@@ -220,7 +220,9 @@ void AddStyle(RunContext* context, const Scene& scene, const SheetOptions& sheet
   const ObjectMasks* masks = scene.object.get();
   const std::unique_ptr<ViewStylizer> stylizer = MakeSceneStylizer(
       context, scene.views, masks,
-      [&](const Image& view, int i) { return masks->Coverage(i, view.width, view.height); });
+      masks == nullptr ? CoverageFunction() : [&](const Image& view, int i) {
+        return masks->Coverage(i, view.width, view.height);
+      });
   const StyledPhotos styled = StylePhotos(scene, stylizer.get(), name);
   const TrainingTargets& targets = styled.targets.targets();
   if (targets.empty())

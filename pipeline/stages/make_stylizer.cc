@@ -6,14 +6,18 @@
 #include <utility>
 
 #include "kernels/base/error.h"
+#include "kernels/render/field_renderer.h"
+#include "pipeline/fields/field_file.h"
 #include "pipeline/images/cube_file.h"
 #include "pipeline/networks/fetch_file.h"
+#include "pipeline/program/device_choice.h"
 #include "pipeline/program/question.h"
 #include "pipeline/report/stage_metrics.h"
 #include "pipeline/stages/command_stylizer.h"
 #include "pipeline/stages/folder_stylizer.h"
 #include "pipeline/stages/matched_stylizer.h"
 #include "pipeline/stages/network_probe.h"
+#include "pipeline/stages/object_edit.h"
 #include "pipeline/workspace/output_names.h"
 #include "pipeline/workspace/stage_record.h"
 #include "stylize/image/color_transfer.h"
@@ -65,6 +69,25 @@ std::unique_ptr<ViewStylizer> MakeColorMethod(StyleMethodKind kind, const StyleO
   const ColorStatistics scene = Pool(parts);
   return MakeColorTransfer(options, style, &scene);
 }
+
+// How much of each pixel the splats cover that pictures of them take the photos' places.
+class ShownParts {
+ public:
+  explicit ShownParts(const RunContext& context)
+      : stored_(ReadFieldFile(context.workspace->Path("field.npz"))),
+        views_(context.Views().InField(stored_)),
+        renderer_(stored_.field, ChooseBackend(context.settings.run.device,
+                                               context.settings.run.reproducible)) {}
+
+  Image Of(int view) const {
+    return CoverageOf(renderer_.Render(views_.CameraOf(view)).transmittance);
+  }
+
+ private:
+  StoredField stored_;
+  WorkingViews views_;
+  FieldRenderer renderer_;
+};
 
 // The method with the files that it reads: a network's name stands for its folder.
 StyleMethod MethodWithFiles(const StyleOptions& options) {
@@ -121,8 +144,20 @@ std::unique_ptr<ViewStylizer> MakeSceneStylizer(RunContext* context, const Worki
   std::string notice;
   const Image style = StyleExample(path, &notice);
   if (!notice.empty()) context->console->Info(notice);
-  if (masks == nullptr) return MakeMethod(context, capture, path, style, photo);
   std::vector<std::unique_ptr<ViewStylizer>> regions;
+  if (masks == nullptr && capture.rendered) {
+    const auto shown = std::make_shared<ShownParts>(*context);
+    regions.push_back(MakeMethod(context, capture, path, style, [&](size_t i) {
+      std::optional<Image> picture = photo(i);
+      if (picture) picture = WithRegion(*picture, shown->Of(static_cast<int>(i)));
+      return picture;
+    }));
+    return MakeMaskedStylizer(
+        std::move(regions), of_colors, coverage ? coverage : [shown](const Image&, int view) {
+          return std::vector<Image>{shown->Of(view)};
+        });
+  }
+  if (masks == nullptr) return MakeMethod(context, capture, path, style, photo);
   for (int k = 0; k < masks->num_regions(); ++k) {
     const Image part = masks->StyleRegion(k, style.width, style.height);
     const auto photo_region = [&](size_t i) -> std::optional<Image> {

@@ -14,6 +14,9 @@
 
 namespace regrade {
 
+// Styles what `coverage` says of a picture, with `masks` of each of their regions. Of splats
+// that came without photos the method styles what they cover, and measures its colours alone: a
+// picture's empty parts stay as they are, and without `coverage` the pictures are the views'.
 std::unique_ptr<ViewStylizer> MakeSceneStylizer(RunContext* context, const WorkingViews& views,
                                                 const ObjectMasks* masks = nullptr,
                                                 const CoverageFunction& coverage = nullptr);

@@ -42,6 +42,11 @@ ObjectWeights VoteForObject(const RunSettings& settings, const WorkingViews& wor
   return weights;
 }
 
+Image CoverageOf(Image transmittance) {
+  for (float& value : transmittance.pixels) value = value < 1 - kNothing ? 1 - value : 0;
+  return transmittance;
+}
+
 CoverageRenderer::CoverageRenderer(const RadianceField& field, const ObjectWeights& weights) {
   for (const std::vector<float>& region : weights.regions)
     renderers_.emplace_back(WeightField(field, region), Backend::kCpu);

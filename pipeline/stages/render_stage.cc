@@ -89,7 +89,10 @@ Frame RenderFrame(RunContext* context, FrameRenderers* renderers, const Camera& 
   PutGain(gain, &frame.source);
   PutGain(gain, &frame.styled);
   if (!with_2d) return frame;
-  if (renderers->object != nullptr) renderers->coverage = renderers->object->Render(camera);
+  if (renderers->object != nullptr)
+    renderers->coverage = renderers->object->Render(camera);
+  else
+    renderers->coverage = {CoverageOf(frame.transmittance)};
   if (renderers->stylizer->StylesAnything()) {
     frame.views_2d = renderers->stylizer->Stylize(frame.source, index);
     if (!renderers->edit->empty())

@@ -58,7 +58,9 @@ StageOutcome StyleViews(RunContext* context, const ProgressFunction& progress) {
   const std::unique_ptr<ObjectMasks> masks = OpenObjectMasks(settings, views);
   const std::unique_ptr<ViewStylizer> stylizer = MakeSceneStylizer(
       context, views, masks.get(),
-      [&](const Image& view, int i) { return masks->Coverage(i, view.width, view.height); });
+      masks == nullptr ? CoverageFunction() : [&](const Image& view, int i) {
+        return masks->Coverage(i, view.width, view.height);
+      });
   if (masks != nullptr && masks->num_known() < std::ssize(capture.views))
     context->console->Info(Concat(masks->num_known(), " of ",
                                   Counted(std::ssize(capture.views), "photo"),

@@ -152,6 +152,7 @@ StageOutcome Stylize(RunContext* context, const JsonValue& inputs,
   request.options.seed = settings.run.seed;
   request.backend = ChooseBackend(settings.run.device, settings.run.reproducible);
   if (object != nullptr) request.object_weights = &weights.all;
+  if (views.capture().rendered) request.options.map_background = false;  // nothing is there
   RestyleHooks hooks;
   hooks.training.progress = parts.Next(1);
   hooks.training.checkpoint = [&](const TrainingState& state) {

@@ -1,6 +1,7 @@
 // Runs of a file of splats in place of photos: with cameras, without, and what is refused.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <filesystem>
 #include <utility>
@@ -10,6 +11,7 @@
 #include "pipeline/capture/capture_store.h"
 #include "pipeline/fields/field_file.h"
 #include "pipeline/files/json_file.h"
+#include "pipeline/images/image_file.h"
 #include "pipeline/splat_files/read_splats.h"
 #include "pipeline/splat_files/splat_ply.h"
 #include "tests/support/expect_error.h"
@@ -168,6 +170,13 @@ TEST(GivenSplats, ViewsArePlacedAndTheStyleIsWrittenBack) {
   const JsonValue report = ReadJsonFile(folder / "o/styles/sun/report.json");
   EXPECT_TRUE(DumpJson(report).find("there are no photos") != std::string::npos);
   EXPECT_TRUE(fs::exists(folder / "o/styles/sun/styled.mp4"));
+  // What the splats leave empty stays as it was, in the method's pictures and in the scene's.
+  for (const char* name : {"views_2d/00000.png", "frames/path_styled/00000.png"}) {
+    const Image picture = ReadImage(folder / (std::string("o/styles/sun/") + name));
+    EXPECT_EQ(*std::ranges::max_element(picture.pixels.begin(), picture.pixels.begin() + 30), 0)
+        << name;
+    EXPECT_GT(*std::ranges::max_element(picture.pixels), 0.3f) << name;
+  }
 
   // The field has the file's splats, and leads back to its coordinates.
   const StoredField stored = ReadFieldFile(folder / "o/field.npz");
