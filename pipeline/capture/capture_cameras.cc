@@ -38,8 +38,7 @@ std::vector<BareCamera> ImportedCameras(const CaptureSource& source,
 std::vector<BareCamera> CamerasWithPhotos(const CaptureSource& source,
                                           const ProgressFunction& progress) {
   if (source.kind == CaptureKind::kPosed)
-    return CamerasOf(
-        ReadCapture(std::filesystem::path(source.photos).parent_path().string()));
+    return CamerasOf(ReadCapture(std::filesystem::path(source.photos).parent_path().string()));
   if (source.kind != CaptureKind::kColmap) return ImportedCameras(source, progress);
   std::vector<BareCamera> cameras;
   const ColmapModel model = ReadColmapModel(source.poses);

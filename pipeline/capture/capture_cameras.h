@@ -14,8 +14,8 @@ namespace regrade {
 void RequireCameras(const CaptureSource& source, const std::string& path);
 
 // Of all that ReadBareCameras reads, and of photos with poses in any layout of CaptureKind, as
-// pinholes of the photos' sizes, in natural order of the photos' names. Photos are decoded where
-// sizes of cameras follow from them. Throws Error(kInput), Interrupted.
+// pinholes of the photos' sizes, in natural order of the photos' names. Photos are decoded
+// where sizes of cameras follow from them. Throws Error(kInput), Interrupted.
 std::vector<BareCamera> CamerasOfCapture(const std::string& path,
                                          const ProgressFunction& progress);
 

@@ -110,7 +110,7 @@ void RunEvaluate(const Command& command, const Arguments& words, Console* consol
   if (frames.frames.empty())
     throw UsageError("there is nothing to compare with the reference", "--reference",
                      "add --frames DIR, or --splats FILE");
-  for (const char* flag : {"cameras", "up", "size"})
+  for (const char* flag : {"cameras", "up", "background", "size"})
     if (options.Given(flag))
       throw UsageError("belongs to --splats", std::string("--") + flag, "leave it out");
   if (!frames.pst50.empty()) return EvaluatePairs(frames, consistency, words, console);

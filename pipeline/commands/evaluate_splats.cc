@@ -44,8 +44,10 @@ void EvaluateSplats(const SplatsOptions& splats, FramesOptions frames,
   if (!has_mode) options.mode = "geometry";
   std::optional<PrivateFolder> unkept;
   if (frames.out.empty()) unkept.emplace();
-  SplatFrames render{frames.reference, splats.splats, splats.views, splats.size,
-                     (unkept ? unkept->path() : frames.out) + "/" + kRenderedFolder};
+  SplatFrames render{
+      frames.reference, splats.splats,
+      splats.views,     splats.background,
+      splats.size,      (unkept ? unkept->path() : frames.out) + "/" + kRenderedFolder};
   const std::string inside = render.folder + "/";
   for (size_t k = 0; k < splats.splats.size(); ++k)
     frames.frames.push_back(inside + StyledName(k));

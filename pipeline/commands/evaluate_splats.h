@@ -12,6 +12,7 @@ namespace regrade {
 struct SplatsOptions {
   std::vector<std::string> splats;
   SplatInput views;
+  std::string background = "auto";
   int size = SplatFrames().size;
 
   template <typename Bind>
@@ -22,6 +23,11 @@ struct SplatsOptions {
                   "folders of --frames. Motion is exact unless --mode or --protocol says "
                   "otherwise"});
     views.Describe(bind);
+    bind("background", background,
+         {.help =
+              "of --splats: the colour behind them, which files do not have; auto is that of "
+              "the folder of regrade that --cameras names, or else black",
+          .choices = "auto|black|white"});
     bind("size", size,
          {.unit = "pixels",
           .help = "of --splats: longer side of the frames; cameras of smaller pictures keep "

@@ -11,6 +11,7 @@
 #include "pipeline/capture/capture_cameras.h"
 #include "pipeline/capture/transforms_json.h"
 #include "pipeline/commands/evaluate_frames.h"
+#include "pipeline/fields/field_file.h"
 #include "pipeline/fields/film_timing.h"
 #include "pipeline/images/depth_map.h"
 #include "pipeline/images/image_file.h"
@@ -32,10 +33,15 @@ constexpr double kSameDepth = 0.05;  // fraction of the depth, as that of Geomet
 constexpr double kOtherGeometry = 0.05;
 
 struct DrawnSplats {
-  DrawnSplats(const std::string& path, Console* console)
-      : scene(ReadForeignSplats(path, 0, console)),
+  DrawnSplats(const std::string& path, const Vec3f& background, Console* console)
+      : scene(Before(background, ReadForeignSplats(path, 0, console))),
         field(FieldInItsWorld(scene)),
         renderer(field, ChooseBackend("auto", false)) {}
+
+  static SplatScene Before(const Vec3f& background, SplatScene scene) {
+    scene.splats.background = background;
+    return scene;
+  }
 
   SplatScene scene;
   RadianceField field;
@@ -63,6 +69,14 @@ bool ShowsSurface(const Image& depth) {
   return std::ranges::any_of(depth.pixels, [](float z) { return z > 0; });
 }
 
+Vec3f BackgroundOf(const SplatFrames& frames) {
+  if (frames.background == "white") return {1, 1, 1};
+  const fs::path field = fs::path(frames.views.cameras) / "field.npz";
+  if (frames.background == "black" || frames.views.cameras.empty() || !fs::exists(field))
+    return {0, 0, 0};
+  return ReadFieldFile(field.string()).field.background;
+}
+
 // Removes what an earlier call wrote, and nothing else.
 void RemoveEarlierFrames(const std::string& folder) {
   std::vector<fs::path> earlier;
@@ -80,10 +94,10 @@ std::vector<Camera> CamerasOfFrames(const SplatFrames& frames, const DrawnSplats
   const std::string& given = frames.views.cameras;
   std::vector<Camera> cameras;
   for (const auto& [name, camera] :
-       given.empty() ? PlacedCameras(reference.scene.splats, reference.renderer,
-                                     frames.views.up, frames.size, frames.reference, console,
-                                     progress)
-                     : CamerasOfCapture(given, progress))
+       given.empty()
+           ? PlacedCameras(reference.scene.splats, reference.renderer, frames.views.up,
+                           frames.size, frames.reference, console, progress)
+           : CamerasOfCapture(given, progress))
     cameras.push_back(ReducedTo(frames.size, camera));
   const std::string from = given.empty() ? "the placed views" : "the cameras of " + given;
   std::string how = "frames at " + from + ", in their order";
@@ -103,8 +117,7 @@ std::vector<Camera> CamerasOfFrames(const SplatFrames& frames, const DrawnSplats
 
 void CheckSeen(int64_t seen, size_t frames, const std::string& file, const std::string& remedy,
                Console* console) {
-  if (seen == 0)
-    throw InputError("no camera sees anything of these splats", file, remedy);
+  if (seen == 0) throw InputError("no camera sees anything of these splats", file, remedy);
   if (seen < static_cast<int64_t>(frames))
     console->Warn(Concat(file, ": ", static_cast<int64_t>(frames) - seen, " of ", frames,
                          " frames show nothing of it"));
@@ -115,8 +128,8 @@ void CheckSeen(int64_t seen, size_t frames, const std::string& file, const std::
 std::vector<std::string> RenderSplatFrames(const SplatFrames& frames, Console* console) {
   const std::string folder = frames.folder + "/";
   RemoveEarlierFrames(frames.folder);
-  ProgressParts parts(console->StageProgress(),
-                      2 + static_cast<double>(frames.styled.size()));
+  ProgressParts parts(console->StageProgress(), 2 + static_cast<double>(frames.styled.size()));
+  const Vec3f background = BackgroundOf(frames);
   std::vector<Camera> cameras;
   std::vector<Image> depths;  // of the reference, those that are compared
   size_t step = 1;
@@ -136,7 +149,7 @@ std::vector<std::string> RenderSplatFrames(const SplatFrames& frames, Console* c
     return seen;
   };
   {
-    const DrawnSplats reference(frames.reference, console);
+    const DrawnSplats reference(frames.reference, background, console);
     cameras = CamerasOfFrames(frames, reference, console, parts.Next(1));
     step = (cameras.size() + kComparedDepths - 1) / kComparedDepths;
     fs::create_directories(folder + kReferenceDepth);
@@ -144,8 +157,9 @@ std::vector<std::string> RenderSplatFrames(const SplatFrames& frames, Console* c
     const int64_t seen =
         render(reference.renderer, kReferenceFrames, [&](size_t i, const Image& depth) {
           WriteDepthMap(folder + kReferenceDepth + Format("/%05zu.npy", i), depth);
-          listed.push_back({std::string(kReferenceFrames) + "/" + FrameName(static_cast<int>(i)),
-                            cameras[i]});
+          listed.push_back(
+              {std::string(kReferenceFrames) + "/" + FrameName(static_cast<int>(i)),
+               cameras[i]});
           if (i % step == 0) depths.push_back(depth);
         });
     CheckSeen(seen, cameras.size(), frames.reference,
@@ -155,16 +169,18 @@ std::vector<std::string> RenderSplatFrames(const SplatFrames& frames, Console* c
   std::vector<std::string> remarks;
   for (size_t k = 0; k < frames.styled.size(); ++k) {
     const std::string& file = frames.styled[k];
-    const DrawnSplats styled(file, console);
+    const DrawnSplats styled(file, background, console);
     DepthComparison depth_of;
-    const int64_t seen = render(styled.renderer, StyledName(k), [&](size_t i, const Image& depth) {
-      if (i % step == 0) depth_of.Add(depths[i / step], depth);
-    });
+    const int64_t seen =
+        render(styled.renderer, StyledName(k), [&](size_t i, const Image& depth) {
+          if (i % step == 0) depth_of.Add(depths[i / step], depth);
+        });
     CheckSeen(seen, cameras.size(), file, "give a file in the world of --reference", console);
     if (depth_of.Share() <= kOtherGeometry) continue;
-    remarks.push_back(Format("%.0f %% of its surface is not at the depth of the reference's, "
-                             "whose motion and masks are used",
-                             100 * depth_of.Share()));
+    remarks.push_back(
+        Format("%.0f %% of its surface is not at the depth of the reference's, "
+               "whose motion and masks are used",
+               100 * depth_of.Share()));
     remarks.back() = file + ": " + remarks.back();
     console->Warn(remarks.back());
   }

@@ -13,6 +13,7 @@ struct SplatFrames {
   std::string reference;            // file of the unstyled splats
   std::vector<std::string> styled;  // files in its world
   SplatInput views;                 // without cameras they are placed in the reference
+  std::string background = "auto";  // see SplatsOptions
   int size = 800;                   // longer side of the frames at most, in pixels
   std::string folder;               // where they are written, an existing folder
 };
@@ -25,7 +26,8 @@ inline constexpr char kReferenceFrames[] = "source", kReferenceDepth[] = "depth"
 //
 //   source/00000.png, ...           the reference
 //   styled/..., styled_2/..., ...   the others
-//   depth/00000.npy, ...            the reference's depth, along the optical axis, in the unit of
+//   depth/00000.npy, ...            the reference's depth, along the optical axis, in the unit
+//   of
 //                                   the cameras; 0 without a surface
 //   transforms.json                 the cameras of source/
 //

@@ -26,8 +26,7 @@ std::vector<BareCamera> PlacedCameras(const Splats& splats, const FieldRenderer&
   const SceneUp chosen =
       up == "auto" ? EstimateUp(splats) : SceneUp{UpOf(up), "up is " + up + " by --up"};
   console->Info(chosen.why);
-  const PlacedViews placed =
-      PlaceViews(splats, renderer, chosen.up, longest, where, progress);
+  const PlacedViews placed = PlaceViews(splats, renderer, chosen.up, longest, where, progress);
   console->Info(placed.summary);
   std::vector<BareCamera> cameras;
   for (const int i : SmoothOrder(placed.cameras))

@@ -12,8 +12,8 @@
 
 namespace regrade {
 
-// See PlaceViews; in an order without jumps. `renderer` draws `splats`, `up` is a value of --up,
-// `longest` the longer side in pixels. Tells the console what was decided.
+// See PlaceViews; in an order without jumps. `renderer` draws `splats`, `up` is a value of
+// --up, `longest` the longer side in pixels. Tells the console what was decided.
 std::vector<BareCamera> PlacedCameras(const Splats& splats, const FieldRenderer& renderer,
                                       const std::string& up, int longest,
                                       const std::string& where, Console* console,

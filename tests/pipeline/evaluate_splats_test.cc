@@ -94,8 +94,7 @@ class EvaluateSplatFiles : public ::testing::Test {
 
   static JsonValue RowOf(const JsonValue& report, const std::string& sequence, int gap = 1) {
     for (const JsonValue& row : report.At("consistency").AsArray())
-      if (row.At("sequence").AsString() == sequence && row.At("gap").AsInt() == gap)
-        return row;
+      if (row.At("sequence").AsString() == sequence && row.At("gap").AsInt() == gap) return row;
     ADD_FAILURE() << "no row of " << sequence << " at gap " << gap;
     return {};
   }
@@ -129,8 +128,7 @@ TEST_F(EvaluateSplatFiles, MotionIsThatOfTheReferencesDepth) {
       pictures.push_back(InEightBits(view.color));
       if (file == "plain.ply") depth.push_back(DepthAlongRays(camera, view.depth));
     }
-    return FrameSource{kShots,
-                       [pictures](int i) { return pictures[static_cast<size_t>(i)]; }};
+    return FrameSource{kShots, [pictures](int i) { return pictures[static_cast<size_t>(i)]; }};
   };
   const FrameSource plain = frames("plain.ply"), strong = frames("strong.ply");
   ConsistencyOptions options;
@@ -162,6 +160,34 @@ TEST_F(EvaluateSplatFiles, MotionIsThatOfTheReferencesDepth) {
   ASSERT_EQ(again.code, 0) << again.text;
   EXPECT_EQ(DumpJson(ReportOf("again").At("consistency")),
             DumpJson(ReportOf("out").At("consistency")));
+}
+
+// Files have no background: it is white where that is asked for, that of a folder of regrade
+// where it gives the cameras, and else black.
+TEST_F(EvaluateSplatFiles, TheBackgroundIsChosen) {
+  const auto corner = [&](const std::string& cameras, const std::vector<std::string>& more) {
+    std::vector<std::string> words{"--splats",    folder_ / "weak.ply",
+                                   "--reference", folder_ / "plain.ply",
+                                   "--cameras",   cameras,
+                                   "--gaps",      "1",
+                                   "--out",       folder_ / "out"};
+    words.insert(words.end(), more.begin(), more.end());
+    const Outcome outcome = Evaluate(words);
+    EXPECT_EQ(outcome.code, 0) << outcome.text;
+    const Image frame = ReadImage(folder_ / "out/rendered/styled/00003.png");
+    return Vec3f{frame.at(0, 0)[0], frame.at(0, 0)[1], frame.at(0, 0)[2]};
+  };
+  EXPECT_EQ(Norm(corner(folder_ / "cameras.json", {})), 0);
+  EXPECT_EQ(Norm(corner(folder_ / "cameras.json", {"--background", "white"}) - Vec3f{1, 1, 1}),
+            0);
+  const StoredField stored{testing::SplatBall(600), {}, {}};
+  std::filesystem::create_directories(folder_ / "run");
+  WriteFieldFile(folder_ / "run/field.npz", stored);
+  WriteCamerasJson(folder_ / "run/cameras.json", Shots());
+  const Vec3f background = stored.field.background;
+  ASSERT_GT(Norm(background), 0.1f);
+  // Half a level of 8 bits in each channel.
+  EXPECT_LT(Norm(corner(folder_ / "run", {}) - background), 0.9f / 255);
 }
 
 TEST_F(EvaluateSplatFiles, SeveralFilesAreComparedWithTheFirst) {
@@ -237,9 +263,8 @@ TEST_F(EvaluateSplatFiles, CamerasWithoutOrderBecomeAPath) {
   EXPECT_OUTPUT(mixed, "120 frames of a path past the cameras of ");
   EXPECT_EQ(RowOf(ReportOf("out"), "styled").At("pairs").AsInt(), 119);
 
-  const Outcome placed =
-      Evaluate({"--splats", folder_ / "weak.ply", "--reference", folder_ / "plain.ply",
-                "--size", "64", "--gaps", "1"});
+  const Outcome placed = Evaluate({"--splats", folder_ / "weak.ply", "--reference",
+                                   folder_ / "plain.ply", "--size", "64", "--gaps", "1"});
   ASSERT_EQ(placed.code, 0) << placed.text;
   EXPECT_OUTPUT(placed, "120 frames of a path past the placed views, 64x");
 }
@@ -257,9 +282,11 @@ TEST_F(EvaluateSplatFiles, WhatIsNoSceneIsRefused) {
   for (const Case& wrong : std::vector<Case>{
            {{"--splats", weak}, 2, "add --reference FILE"},
            {{"--reference", plain}, 2, "or --splats FILE"},
-           {{"--splats", weak, "--reference", plain, "--frames", folder_ / "frames"}, 2,
+           {{"--splats", weak, "--reference", plain, "--frames", folder_ / "frames"},
+            2,
             "--frames: frames of --splats are rendered here"},
-           {{"--splats", weak, "--reference", plain, "--depth", folder_ / "frames"}, 2,
+           {{"--splats", weak, "--reference", plain, "--depth", folder_ / "frames"},
+            2,
             "--depth"},
            {{"--splats", weak, "--reference", plain, "--label", "a", "b"}, 2, "2 labels for 1"},
            {{"--frames", folder_ / "frames", "--cameras", "c.json"}, 2, "belongs to --splats"},
@@ -268,12 +295,15 @@ TEST_F(EvaluateSplatFiles, WhatIsNoSceneIsRefused) {
            {{"--splats", weak, "--reference", folder_ / "empty.ply"}, 3, "empty.ply"},
            {{"--splats", folder_ / "text.ply", "--reference", plain, "--cameras",
              folder_ / "cameras.json"},
-            3, "text.ply"},
-           {{"--splats", weak, "--reference", plain, "--cameras", folder_ / "frames"}, 3,
+            3,
+            "text.ply"},
+           {{"--splats", weak, "--reference", plain, "--cameras", folder_ / "frames"},
+            3,
             "has no cameras"},
            {{"--splats", folder_ / "not.ply", "--reference", plain, "--cameras",
              folder_ / "cameras.json"},
-            3, "not.ply"}}) {
+            3,
+            "not.ply"}}) {
     const Outcome outcome = Evaluate(wrong.words);
     EXPECT_EQ(outcome.code, wrong.code) << wrong.part << "\n" << outcome.text;
     EXPECT_OUTPUT(outcome, wrong.part);
@@ -306,7 +336,8 @@ TEST(CaptureCameras, PhotosMayBeThere) {
     const Camera& camera = truth.frames[i].camera;
     const auto id = static_cast<uint32_t>(truth.frames.size() - i);
     model.cameras.push_back({id, ColmapLens::kPinhole, camera});
-    model.images.push_back({id, id,
+    model.images.push_back({id,
+                            id,
                             std::filesystem::path(truth.frames[i].file).filename().string(),
                             camera.camera_from_world,
                             {}});
