@@ -37,8 +37,10 @@ const std::vector<Command>& AllCommands() {
        RunContactSheet},
       {"evaluate",
        "DIR [OPTIONS] | --frames DIR [DIR ...] [--label TEXT ...] [--reference DIR] "
-       "[--target DIR] [--style PICTURE]",
-       "measures consistency and fidelity, of a run or of any program's frames", RunEvaluate},
+       "[--target DIR] [--style PICTURE] | --splats FILE [FILE ...] --reference FILE "
+       "[--cameras CAPTURE]",
+       "measures consistency and fidelity, of a run or of any program's frames or splats",
+       RunEvaluate},
       {"study", "A B [C ...] --out FILE.html [OPTIONS] | --analyse ANSWERS.json ...",
        "makes a page that asks people which film they prefer, and analyses their answers",
        RunStudy},

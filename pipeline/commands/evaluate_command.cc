@@ -1,4 +1,4 @@
-// regrade evaluate: metrics of a run, or of frames of any program.
+// regrade evaluate: metrics of a run, or of frames or splats of any program.
 #include <algorithm>
 #include <optional>
 
@@ -6,6 +6,7 @@
 #include "kernels/base/error.h"
 #include "pipeline/commands/continue_command.h"
 #include "pipeline/commands/evaluate_frames.h"
+#include "pipeline/commands/evaluate_splats.h"
 #include "pipeline/commands/paired_benchmark.h"
 #include "pipeline/files/json_file.h"
 #include "pipeline/stages/network_probe.h"
@@ -14,7 +15,7 @@
 namespace regrade {
 namespace {
 
-// "--frames A B C" as three flags, and "--label" in the same way.
+// "--frames A B C" as three flags, and "--splats" and "--label" in the same way.
 Arguments SpreadLists(const Arguments& words) {
   Arguments spread;
   std::string list;  // the flag that further words belong to
@@ -35,7 +36,7 @@ Arguments SpreadLists(const Arguments& words) {
       spread.insert(spread.end(), words.begin() + static_cast<std::ptrdiff_t>(i), words.end());
       return spread;
     }
-    for (const std::string flag : {"--frames", "--label"}) {
+    for (const std::string flag : {"--frames", "--splats", "--label"}) {
       if (word == flag || word.starts_with(flag + "=")) list = flag, any = word != flag;
     }
     if (list.empty() || any) spread.push_back(word);
@@ -86,20 +87,32 @@ void EvaluatePairs(const FramesOptions& frames, const ConsistencyOptions& option
 void RunEvaluate(const Command& command, const Arguments& words, Console* console) {
   const Arguments arguments = ExpandProtocol(words);
   FramesOptions frames;
+  SplatsOptions splats;
   ConsistencyOptions consistency;
   ProgramOptions program;
   OptionSet options;
   options.Add("Frames", &frames);
+  options.Add("Splats", &splats);
   options.Add("Evaluation", &consistency);
   options.Add("Program", &program);
-  // Without --frames it evaluates the folder of a run, with all of a run's options.
-  const bool has_frames = std::ranges::any_of(arguments, [](const auto& word) {
-    return word == "--frames" || word.starts_with("--frames=");
+  // Without these it evaluates the folder of a run, with all of a run's options.
+  const bool has_frames = std::ranges::any_of(arguments, [](const std::string& word) {
+    const std::string flag = word.substr(0, word.find('='));
+    return flag == "--frames" || flag == "--splats" || flag == "--reference";
   });
   if (!has_frames && !AsksForHelp(arguments))
     return ContinueStyle(command, arguments, "evaluate", console);
   if (!Prepare(command, SpreadLists(arguments), {.least_words = 0, .most_words = 0}, &options))
     return;
+  if (!splats.splats.empty())
+    return EvaluateSplats(splats, frames, consistency, options.Given("mode").has_value(), words,
+                          console);
+  if (frames.frames.empty())
+    throw UsageError("there is nothing to compare with the reference", "--reference",
+                     "add --frames DIR, or --splats FILE");
+  for (const char* flag : {"cameras", "up", "background", "size"})
+    if (options.Given(flag))
+      throw UsageError("belongs to --splats", std::string("--") + flag, "leave it out");
   if (!frames.pst50.empty()) return EvaluatePairs(frames, consistency, words, console);
   EvaluateFrames(frames, consistency, words, console);
 }

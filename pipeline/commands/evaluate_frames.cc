@@ -31,11 +31,6 @@
 namespace regrade {
 namespace {
 
-// styled, styled_2, ...
-std::string StyledName(size_t folder) {
-  return folder == 0 ? "styled" : Concat("styled_", folder + 1);
-}
-
 void CheckTogether(const FramesOptions& frames, const ConsistencyOptions& options) {
   const bool geometry = options.mode == "geometry";
   if (geometry && (frames.poses.empty() || frames.depth.empty() || frames.reference.empty()))
@@ -60,9 +55,9 @@ void CheckTogether(const FramesOptions& frames, const ConsistencyOptions& option
     throw UsageError("folders are compared by the motion of one reference", "--frames",
                      "add --reference, or give one folder");
   if (!frames.label.empty() && frames.label.size() != frames.frames.size())
-    throw UsageError(Concat(frames.label.size(), " labels for ", frames.frames.size(),
-                            " folders of --frames"),
-                     "--label", "give one for each");
+    throw UsageError(
+        Concat(frames.label.size(), " labels for ", frames.frames.size(), " folders of frames"),
+        "--label", "give one for each");
   if (std::set<std::string>(frames.label.begin(), frames.label.end()).size() !=
       frames.label.size())
     throw UsageError("two folders have the same label", "--label", "give each its own");
@@ -172,7 +167,8 @@ void AddSequences(const FramesOptions& frames, const ConsistencyOptions& options
 
 // Writes report.json, and a page with the metrics and the heat maps.
 void WriteEvaluation(const Workspace& workspace, const RunReport& report,
-                     const TableContext& context, const std::vector<FramePairing>& pairings) {
+                     const TableContext& context, const std::vector<std::string>& remarks,
+                     const std::vector<FramePairing>& pairings) {
   JsonValue json = EvaluationJson(report);
   JsonValue::Array paired;
   for (const FramePairing& pairing : pairings)
@@ -184,6 +180,7 @@ void WriteEvaluation(const Workspace& workspace, const RunReport& report,
                                                 pairing.reference_left_out.end())}});
   json["pairing"] = std::move(paired);
   for (const auto& [sequence, label] : context.labels) json["labels"][sequence] = label;
+  if (!remarks.empty()) json["remarks"] = JsonValue::Array(remarks.begin(), remarks.end());
   WriteJsonFile(workspace.Path("report.json"), json);
 
   RunReport page = report;  // which has no run's command and stages
@@ -216,8 +213,10 @@ EvaluateReport StageOf(const ConsistencyReport& consistency, const ConsistencyOp
 }
 
 TableContext ContextOf(const FramesOptions& frames, const ConsistencyOptions& options,
-                       const std::vector<MissingControl>& missing) {
+                       const std::vector<MissingControl>& missing,
+                       const std::vector<std::string>& remarks) {
   TableContext context;
+  context.remarks = remarks;
   context.form = frames.table;
   context.protocol = ProtocolOf(options);
   context.version = REGRADE_VERSION;
@@ -230,8 +229,12 @@ TableContext ContextOf(const FramesOptions& frames, const ConsistencyOptions& op
 
 }  // namespace
 
+std::string StyledName(size_t folder) {
+  return folder == 0 ? "styled" : Concat("styled_", folder + 1);
+}
+
 void EvaluateFrames(const FramesOptions& frames, const ConsistencyOptions& given,
-                    const Arguments& words, Console* console) {
+                    const Arguments& words, Console* console, const MakeFrames& make) {
   CheckTogether(frames, given);
   ConsistencyOptions options = given;
   const std::vector<Requirement> required =
@@ -240,6 +243,12 @@ void EvaluateFrames(const FramesOptions& frames, const ConsistencyOptions& given
   ProbeEvaluationNetworks(options);
   if (frames.reference.empty())
     console->Warn("no --reference: motion is estimated from the styled frames themselves");
+  std::vector<std::string> remarks;
+  if (make) {
+    console->BeginStage("render");
+    remarks = make();
+    console->EndStage();
+  }
   console->BeginStage("frames");
   Folders folders = OpenFolders(frames, console);
   const std::vector<FramePairing> pairings = Pair(&folders, console);
@@ -279,8 +288,8 @@ void EvaluateFrames(const FramesOptions& frames, const ConsistencyOptions& given
   report.command = {"regrade", "evaluate"};
   report.command.insert(report.command.end(), words.begin(), words.end());
   report.stages.evaluate = StageOf(consistency, options, seconds);
-  const TableContext context = ContextOf(frames, options, measured.missing);
-  if (workspace) WriteEvaluation(*workspace, report, context, pairings);
+  const TableContext context = ContextOf(frames, options, measured.missing, remarks);
+  if (workspace) WriteEvaluation(*workspace, report, context, remarks, pairings);
   console->Event("evaluation", MetricsToJson(report.evaluation));
   console->Lines(FormatTables(consistency, fidelity, context));
   FinishRequirements(CheckRequirements(required, report), frames.junit, console);

@@ -1,6 +1,7 @@
 // regrade evaluate --frames: options, and the evaluation of folders of frames.
 #pragma once
 
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -23,13 +24,15 @@ struct FramesOptions {
               "folder with the styled frames and no other files; sorted by name, 9 before 10; "
               "several folders, one after the other, are compared with the first one, pair by "
               "pair"});
-    bind("label", label,
-         {.help = "what tables call each folder of --frames, in the same order; without it "
-                  "styled, styled_2, ..."});
+    bind(
+        "label", label,
+        {.help = "what tables call each of --frames or --splats, in the same order; without it "
+                 "styled, styled_2, ..."});
     bind("reference", reference,
          {.help = "folder with the same frames before styling; motion and masks come from "
                   "them. Frames belong together by the numbers in their names, or else by "
-                  "equal names, or else by order"});
+                  "equal names, or else by order. Of --splats: the file of splats before "
+                  "styling"});
     bind("target", target,
          {.help = "folder with the 2D method's version of each frame, for fidelity"});
     bind("style", style, {.help = "style picture, for fidelity"});
@@ -55,12 +58,20 @@ struct FramesOptions {
     bind("require", require, {.help = kRequireHelp});
     bind("junit", junit, {.help = kJUnitHelp});
     bind("out", out,
-         {.help = "folder for report.html, report.json and heatmaps/ of the worst pairs"});
+         {.help = "folder for report.html, report.json, heatmaps/ of the worst pairs and, of "
+                  "--splats, rendered/ with the frames"});
   }
 };
 
-// `words` are those of the command line.
+// styled, styled_2, ...: what the report calls the frames of a folder, counted from 0.
+std::string StyledName(size_t folder);
+
+// Makes the frames of the folders that options name; returns sentences for below the tables.
+using MakeFrames = std::function<std::vector<std::string>()>;
+
+// `words` are those of the command line. `make`, which may be null, is called once the options
+// are checked, before any frame is read.
 void EvaluateFrames(const FramesOptions& frames, const ConsistencyOptions& options,
-                    const Arguments& words, Console* console);
+                    const Arguments& words, Console* console, const MakeFrames& make = {});
 
 }  // namespace regrade

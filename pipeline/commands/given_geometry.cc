@@ -1,20 +1,16 @@
 #include "pipeline/commands/given_geometry.h"
 
-#include <cstring>
 #include <filesystem>
 
 #include "kernels/base/error.h"
 #include "pipeline/capture/transforms_json.h"
 #include "pipeline/capture/working_views.h"
 #include "pipeline/commands/frame_pairing.h"
-#include "pipeline/files/atomic_file.h"
 #include "pipeline/files/folder_listing.h"
-#include "pipeline/files/npy_header.h"
+#include "pipeline/images/depth_map.h"
 
 namespace regrade {
 namespace {
-
-constexpr uint64_t kMostBytes = uint64_t{2} << 30;  // of a depth map
 
 std::string SizeText(int64_t width, int64_t height) {
   return Concat(width, " x ", height, " px");
@@ -39,40 +35,6 @@ std::vector<int> PartnersOf(const FrameFolder& reference, const std::vector<std:
                        names.back() + " for " + reference.names.back());
   }
   return pairs.partner;
-}
-
-template <typename T>
-void CopyDepth(const char* from, Image* depth) {
-  for (float& value : depth->pixels) {
-    T element;
-    std::memcpy(&element, from, sizeof element);
-    from += sizeof element;
-    value = static_cast<float>(element);
-  }
-}
-
-Image ReadDepth(const std::string& path, int width, int height) {
-  const std::string bytes = ReadWholeFile(path, kMostBytes);
-  const NpyHeader header = ParseNpyHeader(bytes, path);
-  const auto& shape = header.shape;
-  const bool flat = shape.size() == 2 || (shape.size() == 3 && shape[2] == 1);
-  if (!flat || (header.type != ArrayType::kF32 && header.type != ArrayType::kF64))
-    throw InputError("the depth map is no array [height, width] of float32 or float64", path,
-                     "write it with numpy.save");
-  if (shape[0] != height || shape[1] != width)
-    throw InputError("the depth map is " + SizeText(shape[1], shape[0]) + ", the frames " +
-                         SizeText(width, height),
-                     path, "render it at the frames' size");
-  if (bytes.size() < header.data_offset + header.data_bytes)
-    throw InputError(Concat("the file ends after ", bytes.size(), " of ",
-                            header.data_offset + header.data_bytes, " bytes"),
-                     path);
-  Image depth(width, height, 1);
-  if (header.type == ArrayType::kF32)
-    CopyDepth<float>(bytes.data() + header.data_offset, &depth);
-  else
-    CopyDepth<double>(bytes.data() + header.data_offset, &depth);
-  return depth;
 }
 
 std::vector<Camera> CamerasOf(const std::string& poses, const FrameFolder& reference,
@@ -115,8 +77,8 @@ GeometrySource GivenGeometry(const std::string& poses, const std::string& depth,
     paths.push_back(files[static_cast<size_t>(i)]);
   return [paths, cameras = CamerasOf(poses, reference, notices)](int i) -> FrameGeometry {
     const Camera& camera = cameras[static_cast<size_t>(i)];
-    return {DepthAlongRays(
-                camera, ReadDepth(paths[static_cast<size_t>(i)], camera.width, camera.height)),
+    return {DepthAlongRays(camera, ReadDepthMap(paths[static_cast<size_t>(i)], camera.width,
+                                                camera.height)),
             camera};
   };
 }

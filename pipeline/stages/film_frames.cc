@@ -5,7 +5,6 @@
 
 #include "kernels/base/error.h"
 #include "kernels/scene/common_camera.h"
-#include "pipeline/fields/camera_path.h"
 #include "pipeline/fields/film_timing.h"
 #include "pipeline/workspace/output_names.h"
 
@@ -16,8 +15,9 @@ namespace {
 constexpr double kWidths[] = {1, 0.5, 0.25, 0.1};
 constexpr int kMeasuredMoments = 240;
 
-// Of the widest smoothing whose path is clear, or else of the clearest one.
-double ChooseWidth(const std::vector<Camera>& photos, const PathOptions& options,
+}  // namespace
+
+double WidthOfPath(const std::vector<Camera>& photos, const PathOptions& options,
                    const RadianceField& field, PathClearance* clearance) {
   double chosen = kWidths[0];
   *clearance = {-1, 0};
@@ -32,8 +32,6 @@ double ChooseWidth(const std::vector<Camera>& photos, const PathOptions& options
   }
   return chosen;
 }
-
-}  // namespace
 
 FilmPath MakeFilmPath(const WorkingViews& views, const RenderOptions& options,
                       const RadianceField* field) {
@@ -53,7 +51,7 @@ FilmPath MakeFilmPath(const WorkingViews& views, const RenderOptions& options,
         Metric::Undefined("a forward-facing field begins in front of all cameras");
   } else {
     PathClearance clearance;
-    width = ChooseWidth(photos, options.path, *field, &clearance);
+    width = WidthOfPath(photos, options.path, *field, &clearance);
     path.transmittance = clearance.transmittance;
     path.photo_distance = clearance.photo_distance;
     path.narrowed = width != kWidths[0];

@@ -7,6 +7,7 @@
 
 #include "kernels/field/radiance_field.h"
 #include "pipeline/capture/working_views.h"
+#include "pipeline/fields/camera_path.h"
 #include "pipeline/fields/path_clearance.h"
 #include "pipeline/report/stage_metrics.h"
 #include "pipeline/run/run_settings.h"
@@ -38,6 +39,11 @@ struct FilmPath {
 // to the photos' tour that it does not pass through surfaces, where that is possible.
 FilmPath MakeFilmPath(const WorkingViews& views, const RenderOptions& options,
                       const RadianceField* field);
+
+// The width for MakeCameraPath: of the widest smoothing whose path is clear in `field`, or else
+// of the clearest one, whose clearance it gives. Cameras in the field's frame.
+double WidthOfPath(const std::vector<Camera>& photos, const PathOptions& options,
+                   const RadianceField& field, PathClearance* clearance);
 
 // All frames of a run: at the photos' places, with one camera where photos differ in size or
 // lens, the film's samples, and the film. With --path views the film is made of frames at the

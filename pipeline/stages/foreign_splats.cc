@@ -34,14 +34,12 @@ const char* NameOf(SplatFormat format) {
 
 int DegreeOf(int basis) { return static_cast<int>(std::lround(std::sqrt(basis))) - 1; }
 
-SplatScene ReadForeignSplats(const RunContext& context, bool say) {
-  const uint64_t memory =
-      PlannedMemory(context.settings.run.max_memory_gb, ReadMemoryStatus().available);
-  SplatScene scene =
-      memory > 0 ? ReadSplats(context.source, memory) : ReadSplats(context.source);
-  if (!say) return scene;
-  const std::string name = std::filesystem::path(context.source).filename().string();
-  const auto info = [&](const std::string& text) { context.console->Info(name + ": " + text); };
+SplatScene ReadForeignSplats(const std::string& path, double max_memory_gb, Console* console) {
+  const uint64_t memory = PlannedMemory(max_memory_gb, ReadMemoryStatus().available);
+  SplatScene scene = memory > 0 ? ReadSplats(path, memory) : ReadSplats(path);
+  if (console == nullptr) return scene;
+  const std::string name = std::filesystem::path(path).filename().string();
+  const auto info = [&](const std::string& text) { console->Info(name + ": " + text); };
   info(Concat(scene.splats.count(), " splats with colours of degree ",
               DegreeOf(scene.splats.basis), ", ", NameOf(scene.format),
               (scene.antialiased ? ", antialiased" : "")));
@@ -50,7 +48,7 @@ SplatScene ReadForeignSplats(const RunContext& context, bool say) {
                 scene.first_dropped));
   for (const std::string& note : scene.notes) info(note);
   if (!scene.ignored.empty())
-    context.console->Detail(name + ": not read: " + Join(scene.ignored, ", "));
+    console->Detail(name + ": not read: " + Join(scene.ignored, ", "));
   return scene;
 }
 

@@ -1,10 +1,10 @@
-// The file of splats that a run was given in place of photos.
+// Files of splats that other programs wrote, for runs and for the evaluator.
 #pragma once
 
 #include <string>
 
 #include "kernels/field/radiance_field.h"
-#include "pipeline/run/run_context.h"
+#include "pipeline/program/console.h"
 #include "pipeline/splat_files/splat_scene.h"
 
 namespace regrade {
@@ -12,9 +12,9 @@ namespace regrade {
 // Of so many harmonics a channel.
 int DegreeOf(int basis);
 
-// Reads the run's file, within --max-memory. `say`: tells the console what is in it, which one
-// stage of a run does. Throws Error(kInput) as ReadSplats.
-SplatScene ReadForeignSplats(const RunContext& context, bool say);
+// Reads a file within `max_memory_gb`, of 10^9 bytes; 0: within what is free. Tells `console`
+// what is in it, unless that is null. Throws Error(kInput) as ReadSplats.
+SplatScene ReadForeignSplats(const std::string& path, double max_memory_gb, Console* console);
 
 // In the file's own world, to place views in it.
 RadianceField FieldInItsWorld(const SplatScene& scene);

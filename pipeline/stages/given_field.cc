@@ -29,7 +29,7 @@ StageOutcome ReadGivenField(RunContext* context, const ProgressFunction& progres
   Workspace& workspace = *context->workspace;
   const WorkingViews as_taken = context->Views().AsTaken();
   const Capture& capture = as_taken.capture();
-  SplatScene file = ReadForeignSplats(*context, false);
+  SplatScene file = ReadForeignSplats(context->source, settings.run.max_memory_gb, nullptr);
   ReportOrThrow(progress, 1, 3);
   const int degree = DegreeOf(file.splats.basis);
   SceneProfile profile =

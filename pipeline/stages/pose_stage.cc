@@ -176,7 +176,8 @@ StageOutcome FindPoses(RunContext* context, const CaptureSource& source,
   }
   PoseTracks tracks;
   if (context->FromSplats()) {
-    const RadianceField field = FieldInItsWorld(ReadForeignSplats(*context, true));
+    const RadianceField field = FieldInItsWorld(
+        ReadForeignSplats(context->source, settings.run.max_memory_gb, context->console));
     const FieldRenderer renderer(field,
                                  ChooseBackend(settings.run.device, settings.run.reproducible));
     AddSplatPoints(field, renderer, sparse_folder, source.poses, &capture);

@@ -12,18 +12,18 @@
 #include "kernels/base/hash.h"
 #include "kernels/render/field_renderer.h"
 #include "pipeline/capture/bare_cameras.h"
+#include "pipeline/capture/capture_cameras.h"
 #include "pipeline/capture/capture_store.h"
-#include "pipeline/fields/camera_path.h"
 #include "pipeline/files/text.h"
 #include "pipeline/images/image_file.h"
 #include "pipeline/program/device_choice.h"
 #include "pipeline/report/stage_metrics.h"
 #include "pipeline/stages/foreign_splats.h"
+#include "pipeline/stages/placed_cameras.h"
 #include "pipeline/stages/splat_points.h"
 #include "pipeline/workspace/metrics_json.h"
 #include "reconstruct/colmap/colmap_model.h"
 #include "reconstruct/views/place_views.h"
-#include "reconstruct/views/scene_up.h"
 
 namespace regrade {
 namespace {
@@ -31,39 +31,6 @@ namespace {
 // Films are at most as large as the pictures, and larger than the working size in this way by
 // default.
 constexpr double kFilmOverWorkingSize = 1.6;
-
-Vec3d UpOf(const std::string& word) {
-  Vec3d up;
-  up[word.back() - 'x'] = word.front() == '-' ? -1 : 1;
-  return up;
-}
-
-// Says what was decided.
-std::vector<BareCamera> PlacedCameras(const RunContext& context, const Splats& splats,
-                                      const FieldRenderer& renderer,
-                                      const ProgressFunction& progress) {
-  const RunSettings& settings = context.settings;
-  const std::string& word = settings.splat_input.up;
-  const SceneUp up =
-      word == "auto" ? EstimateUp(splats) : SceneUp{UpOf(word), "up is " + word + " by --up"};
-  context.console->Info(up.why);
-  const int longest =
-      static_cast<int>(std::lround(kFilmOverWorkingSize * settings.scene.photo_size));
-  const PlacedViews placed =
-      PlaceViews(splats, renderer, up.up, longest, context.source, progress);
-  context.console->Info(placed.summary);
-  std::vector<BareCamera> cameras;
-  for (const int i : SmoothOrder(placed.cameras))
-    cameras.push_back(
-        {Format("view%02zu.png", cameras.size()), placed.cameras[static_cast<size_t>(i)]});
-  return cameras;
-}
-
-Camera AtSize(const Camera& camera, double longest) {
-  const double scale = std::min(1.0, longest / std::max(camera.width, camera.height));
-  return camera.Resized(std::max(1, static_cast<int>(std::lround(camera.width * scale))),
-                        std::max(1, static_cast<int>(std::lround(camera.height * scale))));
-}
 
 // The pictures in `folder`, and the model of their cameras.
 std::vector<StagedPhoto> RenderViews(const std::vector<BareCamera>& cameras,
@@ -96,18 +63,21 @@ StageOutcome PlaceViews(RunContext* context, const ProgressFunction& progress) {
   std::filesystem::remove_all(workspace.Path("poses/masks"));
   workspace.NewPath("poses/photos/x");
   workspace.NewPath("poses/sparse/x");
-  const SplatScene scene = ReadForeignSplats(*context, true);
+  const SplatScene scene =
+      ReadForeignSplats(context->source, settings.run.max_memory_gb, context->console);
   const RadianceField field = FieldInItsWorld(scene);
   const FieldRenderer renderer(field,
                                ChooseBackend(settings.run.device, settings.run.reproducible));
   ProgressParts parts(progress, 2);
   const ProgressFunction placing = parts.Next(1);
   const std::string& given = settings.splat_input.cameras;
+  const double longest = kFilmOverWorkingSize * settings.scene.photo_size;
   std::vector<BareCamera> cameras =
-      given.empty() ? PlacedCameras(*context, scene.splats, renderer, placing)
+      given.empty() ? PlacedCameras(scene.splats, renderer, settings.splat_input.up,
+                                    static_cast<int>(std::lround(longest)), context->source,
+                                    context->console, placing)
                     : ReadBareCameras(given);
-  for (BareCamera& bare : cameras)
-    bare.camera = AtSize(bare.camera, kFilmOverWorkingSize * settings.scene.photo_size);
+  for (BareCamera& bare : cameras) bare.camera = ReducedTo(longest, bare.camera);
   ColmapModel model;
   const std::vector<StagedPhoto> photos =
       RenderViews(cameras, renderer, photo_folder, parts.Next(1), &model);
@@ -154,10 +124,7 @@ JsonValue NumbersOf(const std::vector<BareCamera>& cameras) {
 bool HasPhotosOfSplats(const RunContext& context) {
   const std::string& cameras = context.settings.splat_input.cameras;
   if (cameras.empty() || !ReadBareCameras(cameras).empty()) return false;
-  if (context.Source().kind == CaptureKind::kPhotos)
-    throw InputError("has no cameras", cameras,
-                     "give a folder of photos with poses, a COLMAP model or a cameras.json; or "
-                     "leave --cameras out");
+  RequireCameras(context.Source(), cameras);
   return true;
 }
 
@@ -170,7 +137,7 @@ CaptureSize SizeOfSplatViews(const RunContext& context) {
   const std::string& given = context.settings.splat_input.cameras;
   if (given.empty()) return size;
   const std::vector<BareCamera> cameras = ReadBareCameras(given);
-  const Camera camera = AtSize(cameras.at(0).camera, longest);
+  const Camera camera = ReducedTo(longest, cameras.at(0).camera);
   size.photos = std::ssize(cameras);
   size.width = camera.width, size.height = camera.height;
   return size;

@@ -9,9 +9,8 @@
 #include "kernels/synthetic/ray_trace.h"
 #include "kernels/synthetic/synthetic_scene.h"
 #include "pipeline/capture/transforms_json.h"
-#include "pipeline/files/atomic_file.h"
 #include "pipeline/files/json_file.h"
-#include "pipeline/files/npy_header.h"
+#include "pipeline/images/depth_map.h"
 #include "pipeline/images/image_file.h"
 #include "pipeline/synth/synth_effects.h"
 #include "pipeline/synth/synth_grade.h"
@@ -122,13 +121,6 @@ void ClaimFolder(const fs::path& out, const JsonValue& description, bool with_ma
   WriteJsonFile(record.string(), description);
 }
 
-void WriteDepth(const std::string& path, const Image& depth) {
-  std::string bytes = MakeNpyHeader(ArrayType::kF32, {depth.height, depth.width});
-  bytes.append(reinterpret_cast<const char*>(depth.pixels.data()),
-               depth.pixels.size() * sizeof(float));
-  WriteFileAtomically(path, bytes);
-}
-
 void WriteMotion(const fs::path& truth, int from, int to, SyntheticMotion motion) {
   FlowField flow;
   flow.width = motion.width;
@@ -164,7 +156,7 @@ void WriteSyntheticCapture(const std::string& out, const SynthOptions& options,
     if (effects.noise) ApplyNoise(options.seed, i, kSynthNoiseSigma, &view.color);
     const std::string name = FrameName(i, ".png");
     WritePng8((fs::path(out) / "images" / name).string(), view.color);
-    WriteDepth((truth / "depth" / FrameName(i, ".npy")).string(), view.depth);
+    WriteDepthMap((truth / "depth" / FrameName(i, ".npy")).string(), view.depth);
     if (grade != SynthGrade::kNone) {
       ApplyGrade(grade, scene, cameras[i], view.depth, MaskedSolid(scene), &view.color);
       fs::create_directories(truth / "graded");

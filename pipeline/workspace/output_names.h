@@ -32,18 +32,21 @@ inline constexpr char kScenePage[] = "scene.html";
 // Films of camera paths that were made in a page.
 inline constexpr char kFilmsFolder[] = "films";
 
+// What `regrade evaluate --splats` renders.
+inline constexpr char kRenderedFolder[] = "rendered";
+
 // Retouched photos without what is left out of their edits.
 inline constexpr char kRetouchedFolder[] = "retouched";
 
 // What is at the top of the output folder and of a style's, besides `styles`: files and whole
 // folders of our own.
 inline constexpr const char* kOwnNames[] = {
-    ".regrade",       "run.json",        "poses",        "field.npz",    "field_2d.npz",
-    "network.npz",    "object.npz",      "residual.npz", "styled.npz",   "styled.ply",
-    "views_2d",       "frames",          "heatmaps",     "stills",       "layers",
-    kRetouchedFolder, "retouch",         "edit.cube",    "retouch.json", "report.json",
-    "report.html",    kScenePage,        kFilmsFolder,   kStyledFilm,    kWipeFilm,
-    kViews2dFilm,     "styles/.pictures"};
+    ".regrade",       "run.json",      "poses",           "field.npz",    "field_2d.npz",
+    "network.npz",    "object.npz",    "residual.npz",    "styled.npz",   "styled.ply",
+    "views_2d",       "frames",        "heatmaps",        "stills",       "layers",
+    kRetouchedFolder, "retouch",       "edit.cube",       "retouch.json", "report.json",
+    "report.html",    kScenePage,      kFilmsFolder,      kStyledFilm,    kWipeFilm,
+    kViews2dFilm,     kRenderedFolder, "styles/.pictures"};
 
 // "00007.png"
 inline std::string FrameName(int index) { return Format("%05d.png", index); }
