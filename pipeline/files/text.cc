@@ -84,6 +84,21 @@ std::string Join(const std::vector<std::string>& parts, std::string_view separat
   return text;
 }
 
+std::string Wrapped(const std::string& text, size_t indent, size_t width) {
+  std::string result;
+  size_t column = indent;
+  for (const std::string& word : Split(text, ' ')) {
+    if (word.empty()) continue;
+    if (column + word.size() + 1 > width && column > indent) {
+      result += "\n" + std::string(indent, ' ');
+      column = indent;
+    }
+    result += (column > indent ? " " : "") + word;
+    column += word.size() + (column > indent ? 1 : 0);
+  }
+  return result;
+}
+
 std::string LowerCase(std::string text) {
   for (char& c : text)
     if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');

@@ -33,6 +33,10 @@ std::string Counted(int64_t count, const std::string& thing, const std::string& 
 std::vector<std::string> Split(std::string_view text, char separator);
 std::string Join(const std::vector<std::string>& parts, std::string_view separator);
 
+// In lines of at most `width` columns, of which later ones are indented; the first begins at
+// column `indent`, too.
+std::string Wrapped(const std::string& text, size_t indent, size_t width);
+
 // Of ASCII letters.
 std::string LowerCase(std::string text);
 

@@ -109,21 +109,6 @@ std::optional<std::string> Behind(const std::string& text, const char* beginning
   return found;
 }
 
-std::string Wrapped(const std::string& text, size_t indent, size_t width) {
-  std::string result;
-  size_t column = indent;
-  for (const std::string& word : Split(text, ' ')) {
-    if (word.empty()) continue;
-    if (column + word.size() + 1 > width && column > indent) {
-      result += "\n" + std::string(indent, ' ');
-      column = indent;
-    }
-    result += (column > indent ? " " : "") + word;
-    column += word.size() + (column > indent ? 1 : 0);
-  }
-  return result;
-}
-
 }  // namespace
 
 void OptionSet::AddEntry(Entry entry) {
