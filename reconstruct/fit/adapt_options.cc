@@ -43,7 +43,7 @@ void FillIn(const SuitableRates& rates, FitOptions* options) {
   fill(rates.rate_density_end, &options->rate_density_end);
   fill(rates.tv_density, &options->tv_density);
   fill(rates.tv_sh, &options->tv_sh);
-  fill(rates.free_space, &options->free_space);
+  if (options->adaptive()) fill(rates.free_space, &options->free_space);
 }
 
 void DropStages(int64_t pixels, FitOptions* options) {

@@ -175,14 +175,14 @@ TEST(Retouch, TheSceneFollowsEachEditAsItsExactTruth) {
 }
 
 // Of a picture: the mean of the four corners, of a twentieth of the sides each, and of a middle
-// tenth, beside those of another.
+// fifth, beside those of another.
 std::pair<double, double> CornersAndMiddle(const Image& a, const Image& b) {
   double sums[4] = {};
   for (int y = 0; y < a.height; ++y)
     for (int x = 0; x < a.width; ++x) {
       const int dx = std::min(x, a.width - 1 - x), dy = std::min(y, a.height - 1 - y);
       const bool corner = 20 * dx < a.width && 20 * dy < a.height;
-      const bool middle = 20 * dx > 9 * a.width && 20 * dy > 9 * a.height;
+      const bool middle = 10 * dx > 4 * a.width && 10 * dy > 4 * a.height;
       for (int c = 0; c < 3 && (corner || middle); ++c) {
         sums[corner ? 0 : 2] += double{a.at(x, y)[c]};
         sums[corner ? 1 : 3] += double{b.at(x, y)[c]};
