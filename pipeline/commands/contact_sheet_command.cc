@@ -217,12 +217,8 @@ void AddStyle(RunContext* context, const Scene& scene, const SheetOptions& sheet
   const std::string name = Join(files, " and ");
   context->console->BeginStage(name);
   const ProgressFunction progress = context->console->StageProgress();
-  const ObjectMasks* masks = scene.object.get();
-  const std::unique_ptr<ViewStylizer> stylizer = MakeSceneStylizer(
-      context, scene.views, masks,
-      masks == nullptr ? CoverageFunction() : [&](const Image& view, int i) {
-        return masks->Coverage(i, view.width, view.height);
-      });
+  const std::unique_ptr<ViewStylizer> stylizer =
+      MakeSceneStylizer(context, scene.views, scene.object.get());
   const StyledPhotos styled = StylePhotos(scene, stylizer.get(), name);
   const TrainingTargets& targets = styled.targets.targets();
   if (targets.empty())

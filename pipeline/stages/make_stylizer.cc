@@ -70,7 +70,8 @@ std::unique_ptr<ViewStylizer> MakeColorMethod(StyleMethodKind kind, const StyleO
   return MakeColorTransfer(options, style, &scene);
 }
 
-// How much of each pixel the splats cover that pictures of them take the photos' places.
+// How much of each pixel of the views is covered by splats, whose pictures take the photos'
+// places.
 class ShownParts {
  public:
   explicit ShownParts(const RunContext& context)
@@ -88,6 +89,12 @@ class ShownParts {
   WorkingViews views_;
   FieldRenderer renderer_;
 };
+
+// The picture with what is of the region, if it shows any of it.
+std::optional<Image> PartOf(const std::optional<Image>& picture, const Image& region) {
+  if (!picture || !ShowsRegion(region)) return std::nullopt;
+  return WithRegion(*picture, region);
+}
 
 // The method with the files that it reads: a network's name stands for its folder.
 StyleMethod MethodWithFiles(const StyleOptions& options) {
@@ -148,9 +155,7 @@ std::unique_ptr<ViewStylizer> MakeSceneStylizer(RunContext* context, const Worki
   if (masks == nullptr && capture.rendered) {
     const auto shown = std::make_shared<ShownParts>(*context);
     regions.push_back(MakeMethod(context, capture, path, style, [&](size_t i) {
-      std::optional<Image> picture = photo(i);
-      if (picture) picture = WithRegion(*picture, shown->Of(static_cast<int>(i)));
-      return picture;
+      return PartOf(photo(i), shown->Of(static_cast<int>(i)));
     }));
     return MakeMaskedStylizer(
         std::move(regions), of_colors, coverage ? coverage : [shown](const Image&, int view) {
@@ -164,15 +169,16 @@ std::unique_ptr<ViewStylizer> MakeSceneStylizer(RunContext* context, const Worki
       if (!masks->Knows(static_cast<int>(i))) return std::nullopt;
       const std::optional<Image> picture = photo(i);
       if (!picture) return std::nullopt;
-      const Image region =
-          masks->Coverage(static_cast<int>(i), picture->width, picture->height)[k];
-      if (!ShowsRegion(region)) return std::nullopt;
-      return WithRegion(*picture, region);
+      return PartOf(picture, masks->Coverage(static_cast<int>(i), picture->width,
+                                             picture->height)[static_cast<size_t>(k)]);
     };
     regions.push_back(MakeMethod(context, capture, path,
                                  part.empty() ? style : WithRegion(style, part), photo_region));
   }
-  return MakeMaskedStylizer(std::move(regions), of_colors, coverage);
+  return MakeMaskedStylizer(
+      std::move(regions), of_colors, coverage ? coverage : [masks](const Image& view, int i) {
+        return masks->Coverage(i, view.width, view.height);
+      });
 }
 
 NetworkAccess AccessAfterYes(bool yes, Console* console) {

@@ -14,9 +14,9 @@
 
 namespace regrade {
 
-// Styles what `coverage` says of a picture, with `masks` of each of their regions. Of splats
-// that came without photos the method styles what they cover, and measures its colours alone: a
-// picture's empty parts stay as they are, and without `coverage` the pictures are the views'.
+// With `masks` it styles their regions. Of splats that came without photos it styles what they
+// cover, and methods of colours measure that alone: empty parts of pictures stay as they are.
+// `coverage` has the regions of a picture; without it all pictures are of the views.
 std::unique_ptr<ViewStylizer> MakeSceneStylizer(RunContext* context, const WorkingViews& views,
                                                 const ObjectMasks* masks = nullptr,
                                                 const CoverageFunction& coverage = nullptr);

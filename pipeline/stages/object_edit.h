@@ -24,7 +24,7 @@ ObjectWeights VoteForObject(const RunSettings& settings, const WorkingViews& wor
                             const std::vector<int>& views, const ObjectMasks& masks,
                             const RadianceField& field, const ProgressFunction& progress);
 
-// What a pixel of the transmittance does not leave to the background: one region.
+// The share of each pixel that is not the background's, as of one region.
 Image CoverageOf(Image transmittance);
 
 // Renders the consensus masks from any camera: how much of each pixel belongs to each region.

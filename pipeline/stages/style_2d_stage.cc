@@ -56,11 +56,7 @@ StageOutcome StyleViews(RunContext* context, const ProgressFunction& progress) {
   const WorkingViews views = context->Views();
   const Capture& capture = views.capture();
   const std::unique_ptr<ObjectMasks> masks = OpenObjectMasks(settings, views);
-  const std::unique_ptr<ViewStylizer> stylizer = MakeSceneStylizer(
-      context, views, masks.get(),
-      masks == nullptr ? CoverageFunction() : [&](const Image& view, int i) {
-        return masks->Coverage(i, view.width, view.height);
-      });
+  const std::unique_ptr<ViewStylizer> stylizer = MakeSceneStylizer(context, views, masks.get());
   if (masks != nullptr && masks->num_known() < std::ssize(capture.views))
     context->console->Info(Concat(masks->num_known(), " of ",
                                   Counted(std::ssize(capture.views), "photo"),

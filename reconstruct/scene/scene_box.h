@@ -16,7 +16,8 @@ struct SceneBox {
   // picture is as high as wide.
   float voxel_aspect = 1;
   std::optional<Vec3f> background;  // sRGB behind everything; default: the photos' mean colour
-  bool spheres = false;             // fits what is far outside of the box: voxels on spheres
+  // Fits what is far outside of the box: voxels on spheres, splats from far starts.
+  bool spheres = false;
 };
 
 // Vertices per axis, `longest` on the longest side; voxels are cubes up to rounding. With

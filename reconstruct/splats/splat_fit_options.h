@@ -29,8 +29,8 @@ struct SplatFitOptions {
   float degree_each = 1.0f / 30;
   float small_until = 0.3f;  // at half the photos' size
   // Fits of so many steps or more would learn their photos by heart: in them the share of
-  // EQ(splat-dropout) rises to `dropout`, and in their second half all rates fall to `fall` of
-  // what they were, so that what this stirs settles.
+  // EQ(splat-dropout) rises to `dropout`, and in their second half all other rates than that of
+  // means fall to `fall` of what they were, so that what this stirs settles.
   int long_from = 4000;
   float dropout = 0.1f, fall = 0.1f;
   bool antialiased = false;
