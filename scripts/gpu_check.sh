@@ -45,7 +45,7 @@ measure_kernels() {
   local fit="fit --capture $capture --fit-resolutions 128,256 --fit-rays 16384 --fit-steps"
   local profile="ncu --clock-control none --csv --metrics $metrics"
   # shellcheck disable=SC2086  # words
-  "$dir/regrade_gpu" $fit 600,600 --field "$field" >/dev/null 2>&1 || return 1
+  "$dir/regrade_gpu" $fit 600,600 --out "$field" >/dev/null 2>&1 || return 1
   # The last steps of the finer grid, each kernel once.
   # shellcheck disable=SC2086
   $profile -k 'regex:FitRays|StepKernel|TotalVariation|DrawKernel' --launch-skip 2000 --launch-count 4 \
@@ -98,7 +98,7 @@ run() {
     [[ -e $capture ]] || continue
     name=$(basename "$capture" .npz)
     # shellcheck disable=SC2086  # settings are words
-    if record=$("$dir/regrade_gpu" fit --capture "$capture" --field "$out/field.npz" ${REGRADE_FIT:---preset best} \
+    if record=$("$dir/regrade_gpu" fit --capture "$capture" --out "$out/field.npz" ${REGRADE_FIT:---preset best} \
       2>/dev/null); then
       printf ',\n"fit_%s": %s' "$name" "$record" >>"$out/gpu_check.json"
       echo "$name: $record" | cut -c1-400
@@ -137,7 +137,7 @@ repeat() {
     for turn in 1 2 3; do
       rm -rf "$out"/{field,network,styled}.npz "$out/frames"
       # shellcheck disable=SC2086  # options are words
-      record=$("$dir/regrade_gpu" fit --capture "$capture" --field "$out/field.npz" $option $fit 2>/dev/null &&
+      record=$("$dir/regrade_gpu" fit --capture "$capture" --out "$out/field.npz" $option $fit 2>/dev/null &&
         "$dir/regrade_gpu" style --capture "$capture" --field "$out/field.npz" --network "$out/network.npz" $option \
           --styled "$out/styled.npz" --frames "$out/frames" ${REGRADE_STYLE:-} 2>/dev/null) ||
         { echo "$option $turn failed"; return 1; }

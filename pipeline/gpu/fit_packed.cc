@@ -161,7 +161,7 @@ void FitPacked(const FitPackedOptions& settings, const FitOptions& fit_options,
   };
   HeldOut measured;
   JsonValue::Array stages;
-  hooks.keep_field = !settings.field.empty();
+  hooks.keep_field = !settings.out.empty();
   hooks.measure = [&](FitEngine* engine) {
     const double seconds = ClockSeconds() - fit_start;
     measured = MeasureHeldOut(engine, capture, {options.step}, settings.frames);
@@ -172,7 +172,7 @@ void FitPacked(const FitPackedOptions& settings, const FitOptions& fit_options,
   const double fit_seconds = ClockSeconds() - fit_start;
   JsonValue render;
   if (hooks.keep_field) {
-    WriteFieldFile(settings.field,
+    WriteFieldFile(settings.out,
                    {fit.field, capture.scene.field_from_world, capture.scene.ndc});
     if (backend == Backend::kCuda && !fit.field.geometry->cells.on()) {
       const DeviceGrid grid = UploadGrid(MakeFastGrid(fit.field));

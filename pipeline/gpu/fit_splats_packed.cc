@@ -13,6 +13,7 @@
 #include "pipeline/fields/field_file.h"
 #include "pipeline/files/json_file.h"
 #include "pipeline/gpu/gpu_commands.h"
+#include "pipeline/run/fit_memory.h"
 #include "reconstruct/splats/fit_splats.h"
 #include "reconstruct/splats/splat_engine.h"
 
@@ -59,12 +60,19 @@ void FitSplatsPacked(const FitSplatsOptions& settings, const SplatFitOptions& fi
   const PackedCapture capture = ReadPackedCapture(settings.capture);
   const Backend backend = settings.device == "cpu" ? Backend::kCpu : Backend::kCuda;
   std::vector<TrainingView> views;
+  int64_t pixels = 0;
   for (const PackedView& view : capture.views) {
     if (view.held_out) continue;
     views.push_back({view.camera, &view.photo, view.points});
     views.back().camera.ndc = {};  // splats need no device coordinates
+    pixels += view.photo.num_pixels();
   }
-  SplatFitOptions options = fit;
+  SplatFitOptions options =
+      SplatsWithinMemory(fit, {.backend = backend,
+                               .pixels = pixels,
+                               .photos = static_cast<int64_t>(views.size()),
+                               .box = capture.scene.box})
+          .options;
   options.seed = settings.seed;
   SplatFitHooks hooks;
   double last_note = 0;
@@ -83,11 +91,11 @@ void FitSplatsPacked(const FitSplatsOptions& settings, const SplatFitOptions& fi
   const double read_seconds = ClockSeconds() - start;
   const SplatFitResult result = FitSplats(views, capture.scene.box, options, hooks, backend);
   const SceneBox& box = capture.scene.box;
-  if (!settings.field.empty())
-    WriteFieldFile(settings.field, {FieldOfSplats(result.splats, {{}, box.center, box.radius},
-                                                  box.near_clip, options.antialiased),
-                                    capture.scene.field_from_world,
-                                    {}});
+  if (!settings.out.empty())
+    WriteFieldFile(settings.out, {FieldOfSplats(result.splats, {{}, box.center, box.radius},
+                                                box.near_clip, options.antialiased),
+                                  capture.scene.field_from_world,
+                                  {}});
   JsonValue::Array curve;
   for (size_t i = 0; i < result.curve.size();
        i += std::max<size_t>(1, result.curve.size() / 100))

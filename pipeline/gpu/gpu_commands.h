@@ -18,7 +18,7 @@ namespace regrade {
 
 struct FitPackedOptions {
   std::string capture;  // packed
-  std::string field;    // .npz to write; empty: none
+  std::string out;      // .npz to write; empty: none
   std::string frames;   // folder for pictures; empty: none
   std::string preset = "standard";
   std::string paper_config = "auto";
@@ -45,7 +45,7 @@ struct FitPackedOptions {
           .help = "stops there, with the checkpoint written; 0: never",
           .min = 0,
           .max = 1e6});
-    bind("field", field, {.help = "the .npz file that the field is written to"});
+    bind("out", out, {.help = "the .npz file that the field is written to"});
     bind("frames", frames, {.help = "a folder for .ppm pictures of the held-out views"});
     bind("device", device, {.help = "where arithmetic runs", .choices = "cpu|cuda"});
     bind("seed", seed, {.help = "seed of all random numbers"});
@@ -57,15 +57,19 @@ struct FitPackedOptions {
 
 struct FitSplatsOptions {
   std::string capture;  // packed
-  std::string field;    // .npz to write; empty: none
+  std::string out;      // .npz to write; empty: none
   std::string frames;   // folder for pictures; empty: none
+  std::string preset = "standard";
   std::string device = "cuda";
   uint64_t seed = 0;
 
   template <typename Bind>
   void Describe(Bind& bind) {
+    bind("preset", preset,
+         {.help = "steps and number of splats, as of `regrade run`",
+          .choices = "draft|standard|best"});
     bind("capture", capture, {.help = "a file of `regrade pack`"});
-    bind("field", field, {.help = "the .npz file that the field is written to"});
+    bind("out", out, {.help = "the .npz file that the field is written to"});
     bind("frames", frames, {.help = "a folder for .ppm pictures of the held-out views"});
     bind("device", device, {.help = "where arithmetic runs", .choices = "cpu|cuda"});
     bind("seed", seed, {.help = "seed of all random numbers"});
@@ -85,7 +89,7 @@ struct StylePackedOptions {
   template <typename Bind>
   void Describe(Bind& bind) {
     bind("capture", capture, {.help = "a file of `regrade pack --style`"});
-    bind("field", field, {.help = "the .npz file that `regrade_gpu fit|splats --field` wrote"});
+    bind("field", field, {.help = "the .npz file that `regrade_gpu fit|splats --out` wrote"});
     bind("styled", styled, {.help = "the .npz file that the restyled field is written to"});
     bind("frames", frames,
          {.help = "a folder for .ppm pictures of the held-out views before and after"});

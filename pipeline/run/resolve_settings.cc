@@ -97,9 +97,10 @@ void RefuseFlagsOfOtherField(const OptionSet& options) {
 bool OnCard(const OptionSet& options) {
   const JsonValue values = options.Values();
   const JsonValue *device = values.Find("device"), *reproducible = values.Find("reproducible");
-  if (device == nullptr || reproducible == nullptr) return false;
+  if (device == nullptr) return false;
   return PrefersCard(options.Given("device").value_or(device->AsString()),
-                     options.Given("reproducible").has_value() || reproducible->AsBool());
+                     options.Given("reproducible").has_value() ||
+                         (reproducible != nullptr && reproducible->AsBool()));
 }
 
 bool IsInside(const std::string& path, const std::string& folder) {

@@ -39,6 +39,19 @@ TEST(GpuOptions, FlagsOverrideTheRecipeWhereverTheyStand) {
   }
 }
 
+// `regrade run` has a --field of its own, the kind of field, which presets set.
+TEST(GpuOptions, APresetSetsTheEffortAndNoFile) {
+  for (const std::string& command : {std::string("fit"), std::string("splats")}) {
+    GpuSettings settings;
+    OptionSet options;
+    ASSERT_TRUE(settings.Bind(command, &options));
+    ReadFlags({"--capture", "a.npz", "--preset", "best"}, &options);
+    EXPECT_EQ(settings.fit_packed.out + settings.fit_splats.out, "");
+    EXPECT_EQ(settings.fit.max_cells, command == "fit" ? 20.0f : FitOptions().max_cells);
+    EXPECT_EQ(settings.splats.steps, command == "splats" ? 10000 : SplatFitOptions().steps);
+  }
+}
+
 TEST(GpuOptions, StrayWordsAndUnknownRecipesAreRefused) {
   EXPECT_THROW(Read({"paper"}), Error);
   EXPECT_THROW(Read({"--recipe=fast"}), Error);
@@ -58,7 +71,7 @@ TEST_F(FitPackedBall, TheGridIsLoweredToMemory) {
   FitPackedOptions settings;
   settings.capture = folder / "ball.npz";
   WritePackedCapture(settings.capture, capture);
-  settings.field = folder / "field.npz";
+  settings.out = folder / "field.npz";
   settings.device = "cpu";
   settings.max_memory_gb = 0.18;
   options_.resolutions = {16, 96};
@@ -68,7 +81,7 @@ TEST_F(FitPackedBall, TheGridIsLoweredToMemory) {
   options_.prune_weight = 0;
   OptionSet bound;
   FitPacked(settings, options_, &bound);
-  const int side = ReadFieldFile(settings.field).field.geometry->frame.resolution.x;
+  const int side = ReadFieldFile(settings.out).field.geometry->frame.resolution.x;
   EXPECT_GE(side, kLeastResolution);
   EXPECT_LT(side, 96);
 }
