@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# Runs all tests: a build with warnings as errors, every test, then kernels and readers again under the address and
-# undefined-behaviour sanitizers. Not interactive. Exit status: 0 if everything passed.
+# Runs the tests: a build with warnings as errors, every test but those of scripts/nightly.sh, then kernels and readers
+# again under the address and undefined-behaviour sanitizers. Not interactive. Exit status: 0 if everything passed.
 set -euo pipefail
 exec </dev/null
 
@@ -26,7 +26,7 @@ cmake --build --preset cpu --parallel "$jobs"
 echo "== tests"
 # Threads that wait would take the cores of the test beside them.
 export OMP_WAIT_POLICY=passive
-if ! ctest --test-dir build/cpu --output-on-failure -j2; then
+if ! ctest --test-dir build/cpu --output-on-failure -j2 -LE nightly; then
   echo "== what failed, once more"
   grep -A12 ': Failure$' build/cpu/Testing/Temporary/LastTest.log | tail -n 100
   exit 1

@@ -19,6 +19,7 @@
 #include "pipeline/synth/synth_grade.h"
 #include "tests/support/edit_truth.h"
 #include "tests/support/expect_error.h"
+#include "tests/support/nightly.h"
 #include "tests/support/record_error.h"
 #include "tests/support/source_dir.h"
 #include "tests/support/spawn.h"
@@ -82,6 +83,7 @@ std::vector<double> Consistencies(const std::vector<Image>& reference,
 // Beside the linear map's error the ceiling is 0.084 for the global grade and below 0.006 for
 // the others (tests/benchmarks/retouch_benchmark.cc).
 TEST(Retouch, TheSceneFollowsEachEditAsItsExactTruth) {
+  REGRADE_AT_NIGHT();
   const TemporaryFolder folder;
   const auto edited = [&](const std::string& grade) { return folder / (grade + ".png"); };
   ASSERT_EQ(Regrade({"synth", folder / "s", "--views", "16", "--size", "192x144", "--grade",

@@ -1,0 +1,19 @@
+#!/usr/bin/env bash
+# The long forms of the tests, some hours on two cores, in the build that scripts/test.sh made. Not interactive. Exit
+# status: 0 if everything passed.
+set -uo pipefail
+exec </dev/null
+
+cd "$(dirname "${BASH_SOURCE[0]}")/.."
+export OMP_WAIT_POLICY=passive REGRADE_REQUIRE_BROWSER=1
+# Tests that are skipped else, pairs that attack the bound of a network, mutants for each reader.
+export REGRADE_NIGHTLY=1 REGRADE_PAIRS=1000000 REGRADE_FUZZ_MUTANTS=1000000
+program=build/cpu/pipeline/regrade
+failed=0
+run() { echo "== $*"; "$@" || failed=1; }
+
+run ctest --test-dir build/cpu --output-on-failure -j2 --timeout 36000
+run python3 tests/scripts/crash_recovery.py $program --kills 200 --pose-kills 10
+run python3 tests/scripts/write_fault_injection.py $program build/cpu/tests/pipeline/libfailing_writes.so
+run python3 tests/scripts/resource_limits.py $program
+exit $failed
