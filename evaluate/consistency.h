@@ -87,7 +87,8 @@ struct ConsistencyOptions {
              "flags pairs with a smaller fraction of comparable pixels; unrelated images reach "
              "0.35, neighbouring views of a scene 0.8",
          .min = 0,
-         .max = 1});
+         .max = 1,
+         .constant = true});
     bind("controls", controls,
          {.help = "adds rows that bound the table: one linear colour map, the styled frames "
                   "blurred and in grey; for runs also the photos and the 2D method on them"});

@@ -37,6 +37,8 @@ struct OptionInfo {
   const char* runs = "";   // programs, and networks
   const char* reads = "";  // files and folders; those in the run's folder are its own
   bool once = false;       // of one start: not taken from a run's folder
+  // No flag of a command that has --config, which alone changes it there, for measurements.
+  bool constant = false;
 };
 
 }  // namespace regrade

@@ -72,6 +72,11 @@ void PrintHelp(const Command& command, const Arguments& arguments, const OptionS
   } else {
     std::printf("regrade %s %s\n%s\n", command.name, command.usage, command.summary);
     const Arguments shown = WordsOf(command.shown);
+    if (HasFlag(arguments, kHelpConstants)) {
+      std::printf("What --config alone changes, for measurements:\n%s",
+                  options.HelpOfConstants().c_str());
+      return;
+    }
     const bool all = HasFlag(arguments, "--help-all") || shown.empty();
     std::printf("%s%s", all ? "" : "\n",
                 options.Help(required, all ? Arguments() : shown).c_str());
@@ -103,7 +108,7 @@ bool AcceptOutside(const std::string& run_json, const OutsideOptions& outside, b
 }  // namespace
 
 bool AsksForHelp(const Arguments& arguments) {
-  for (const char* flag : {"--help", "-h", "--help-all", kHelpMan, kHelpWords})
+  for (const char* flag : {"--help", "-h", "--help-all", kHelpConstants, kHelpMan, kHelpWords})
     if (HasFlag(arguments, flag)) return true;
   return false;
 }

@@ -46,14 +46,15 @@ struct Prepared {
 };
 
 // The beginning of every command. --help prints usage and the options of Command::shown,
-// --help-all all of them, and kHelpMan and kHelpWords what `regrade manual` is made of; each
-// returns nothing.
-// Otherwise parses the arguments, sets the options (ResolveSettings) and the number of threads.
-// `options` has ProgramOptions among others. Throws Error(kUsage) for a wrong number of words,
-// Error(kInput) for a folder without a run.
+// --help-all all of them, kHelpConstants what --config alone changes, and kHelpMan and
+// kHelpWords what `regrade manual` is made of; each returns nothing. Otherwise parses the
+// arguments, sets the options (ResolveSettings) and the number of threads. `options` has
+// ProgramOptions among others. Throws Error(kUsage) for a wrong number of words, Error(kInput)
+// for a folder without a run.
 std::optional<Prepared> Prepare(const Command& command, const Arguments& arguments,
                                 const Preparation& preparation, OptionSet* options);
 
+inline constexpr char kHelpConstants[] = "--help-constants";
 inline constexpr char kHelpMan[] = "--help-man", kHelpWords[] = "--help-words";
 
 // Is --help, -h or one of the others among the flags?

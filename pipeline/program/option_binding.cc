@@ -95,6 +95,15 @@ std::string FlagText(const JsonValue& value) {
   return text;
 }
 
+// {"name": value} with the value of a flag of that text.
+JsonValue AsConfig(const std::string& name, const std::string& text) {
+  try {
+    return JsonValue::Object{{name, ParseJson(text, "")}};  // a number, true or false
+  } catch (const Error&) {
+    return JsonValue::Object{{name, text}};
+  }
+}
+
 // The text behind the one of `beginnings` that it has, see OptionInfo::runs; nothing without.
 std::optional<std::string> Behind(const std::string& text, const char* beginnings) {
   std::optional<std::string> found;
@@ -124,7 +133,8 @@ const OptionSet::Entry* OptionSet::Find(const std::string& name) const {
 
 std::vector<std::string> OptionSet::Names() const {
   std::vector<std::string> names = {"help"};
-  for (const Entry& entry : entries_) names.push_back(entry.name);
+  for (const Entry& entry : entries_)
+    if (IsFlag(entry)) names.push_back(entry.name);
   return names;
 }
 
@@ -181,6 +191,10 @@ std::vector<std::string> OptionSet::Parse(const std::vector<std::string>& argume
     Flag flag{option.string_key, option.value.empty() ? "true" : option.value[0]};
     if (option.value.empty() && Find(flag.name) == nullptr)
       flag = {flag.name.substr(std::strlen("no-")), "false"};
+    if (const Entry& entry = *Find(flag.name); !IsFlag(entry))
+      throw UsageError(
+          "a constant is no flag", "--" + flag.name,
+          Concat("give --config '", DumpJson(AsConfig(flag.name, flag.value), -1), "'"));
     if (Given(flag.name) && !IsTextList(*Find(flag.name)))
       throw UsageError("given twice", "--" + flag.name, "keep one of them");
     flags_.push_back(flag);
@@ -307,6 +321,11 @@ bool OptionSet::IsOnce(const std::string& name) const {
   return entry != nullptr && entry->info.once;
 }
 
+bool OptionSet::IsConstant(const std::string& name) const {
+  const Entry* const entry = Find(name);
+  return entry != nullptr && entry->info.constant;
+}
+
 JsonValue OptionSet::Values() const {
   JsonValue values = JsonValue::Object();
   for (const Entry& entry : entries_) values[entry.name] = ValueOf(entry);
@@ -335,16 +354,17 @@ OptionSet::Description OptionSet::Describe(const Entry& entry, const Texts& requ
   return description;
 }
 
-std::string OptionSet::Help(const Texts& required, const Texts& only) const {
+template <typename Shown>
+std::string OptionSet::HelpOf(const Texts& required, bool headed, const char* dashes,
+                              const Shown& shown) const {
   std::string text, heading;
   for (const Entry& entry : entries_) {
-    const bool shown = only.empty() || std::ranges::find(only, entry.name) != only.end();
-    if (!shown) continue;
-    if (only.empty() && (entry.heading != heading || text.empty()))
+    if (!shown(entry)) continue;
+    if (headed && (entry.heading != heading || text.empty()))
       text += "\n" + entry.heading + ":\n";
     heading = entry.heading;
     const Description description = Describe(entry, required);
-    std::string head = "  --" + entry.name;
+    std::string head = Concat("  ", dashes, entry.name);
     if (!description.value.empty()) head += " " + description.value;
     constexpr size_t kIndent = 28, kWidth = 96;
     if (head.size() + 2 > kIndent) {
@@ -358,6 +378,21 @@ std::string OptionSet::Help(const Texts& required, const Texts& only) const {
   return text;
 }
 
+std::string OptionSet::Help(const Texts& required, const Texts& only) const {
+  return HelpOf(required, only.empty(), "--", [&](const Entry& entry) {
+    return only.empty() ? IsFlag(entry) : std::ranges::find(only, entry.name) != only.end();
+  });
+}
+
+std::string OptionSet::HelpOfConstants() const {
+  return HelpOf({}, true, "", [&](const Entry& entry) { return !IsFlag(entry); });
+}
+
+int OptionSet::count() const {
+  return static_cast<int>(
+      std::ranges::count_if(entries_, [this](const Entry& entry) { return IsFlag(entry); }));
+}
+
 std::string OptionSet::ManPage(const Texts& required) const {
   std::string text, heading;
   // A dash that is typed, and a line that is no request.
@@ -368,6 +403,7 @@ std::string OptionSet::ManPage(const Texts& required) const {
     return result;
   };
   for (const Entry& entry : entries_) {
+    if (!IsFlag(entry)) continue;
     if (entry.heading != heading) text += ".PP\n" + entry.heading + ":\n";
     heading = entry.heading;
     const Description description = Describe(entry, required);
@@ -381,6 +417,7 @@ std::string OptionSet::ManPage(const Texts& required) const {
 std::string OptionSet::CompletionWords() const {
   std::string text;
   for (const Entry& entry : entries_) {
+    if (!IsFlag(entry)) continue;
     text += "--" + entry.name;
     for (const std::string& choice : Split(entry.info.choices, '|'))
       if (!choice.empty()) text += " " + choice;

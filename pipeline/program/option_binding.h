@@ -28,7 +28,7 @@ class OptionSet {
   // Reads flags without changing the structs; returns the words that are no flags. Forms:
   // "--name value", "--name=value"; for switches "--name" and "--no-name"; "--" ends flags.
   // Throws Error(kUsage) for unknown names (with the nearest known one), a missing value, and a
-  // flag given twice, unless it is a list of texts.
+  // flag given twice, unless it is a list of texts, and for a constant (OptionInfo).
   std::vector<std::string> Parse(const std::vector<std::string>& arguments);
 
   // The value of --name on the command line, the first of several.
@@ -53,15 +53,19 @@ class OptionSet {
   std::vector<Outside> OutsideOf(const JsonValue& values) const;
   // Is it an option of one start?
   bool IsOnce(const std::string& name) const;
+  bool IsConstant(const std::string& name) const;
 
-  // Names, units, effects, defaults and bounds, of the options named in `only`, or of all. Call
-  // before flags are applied. `required`: names of options that the command demands.
+  // Names, units, effects, defaults and bounds, of the options named in `only`, or of all that
+  // are flags. Call before flags are applied. `required`: names of options that the command
+  // demands.
   std::string Help(const Texts& required = {}, const Texts& only = {}) const;
-  // The same of all as the body of a section of a man page.
+  // The same of what --config alone changes, without dashes; empty where there is nothing.
+  std::string HelpOfConstants() const;
+  // That of flags as the body of a section of a man page.
   std::string ManPage(const Texts& required = {}) const;
   // For completion: a line for each option, "--name" and its choices.
   std::string CompletionWords() const;
-  int count() const { return static_cast<int>(entries_.size()); }
+  int count() const;  // of flags
 
  private:
   using Target =
@@ -89,6 +93,13 @@ class OptionSet {
     std::string value, sentence;
   };
   static Description Describe(const Entry& entry, const Texts& required);
+  // Lines of help, below headings if `headed`, of the entries that `shown` accepts.
+  template <typename Shown>
+  std::string HelpOf(const Texts& required, bool headed, const char* dashes,
+                     const Shown& shown) const;
+  bool IsFlag(const Entry& entry) const {
+    return !entry.info.constant || Find("config") == nullptr;
+  }
 
   void AddEntry(Entry entry);
   const Entry* Find(const std::string& name) const;

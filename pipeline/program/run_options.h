@@ -66,12 +66,11 @@ struct RunOptions {
                   "view-dependence and pose-refinement"});
     bind("max-memory", max_memory_gb,
          {.unit = "GB", .help = kMaxMemoryHelp, .min = 0, .max = 1e6});
-    bind(
-        "reproducible", reproducible,
-        {.help = "gives the same bytes for any number of threads and any interruption, from "
-                 "finished poses on; slower. --device auto then means the CPU; with --device "
-                 "cuda --fit-exact-sums and --style-exact-sums are on, and the bytes are those "
-                 "of this card and build"});
+    bind("reproducible", reproducible,
+         {.help = "gives the same bytes for any number of threads and any interruption, from "
+                  "finished poses on; slower. --device auto then means the CPU; with --device "
+                  "cuda fit-exact-sums and style-exact-sums are on, and the bytes are those "
+                  "of this card and build"});
   }
 };
 
@@ -95,7 +94,9 @@ struct StartOptions {
   template <typename Bind>
   void Describe(Bind& bind) {
     bind("config", config,
-         {.help = "a run.json to take options and arguments from; flags override them",
+         {.help = "a run.json to take options and arguments from; or constants of the program, "
+                  "which --help-constants lists, as {\"NAME\": VALUE, ...} in a file or here. "
+                  "Flags override them",
           .once = true});
     bind("restart-from", restart_from,
          {.help = "repeats this stage and all later ones, even where they are done",

@@ -47,12 +47,19 @@ std::vector<std::string> EquivalentCommand(const RunContext& context) {
   const JsonValue values = context.options.Values();
   // The flags of another kind of field are refused.
   const JsonValue unused = OptionsOfOtherFit(context.settings.scene.field);
+  JsonValue constants = JsonValue::Object();
   for (const auto& [name, value] : values.AsObject()) {
     if (name == "preset" || start.Find(name) != nullptr || program.Find(name) != nullptr ||
         unused.Find(name) != nullptr)
       continue;
-    if (!(before.At(name) == value)) AddFlag(name, value, &words);
+    if (before.At(name) == value) continue;
+    if (context.options.IsConstant(name))
+      constants[name] = value;
+    else
+      AddFlag(name, value, &words);
   }
+  if (!constants.AsObject().empty())
+    words.insert(words.end(), {"--config", DumpJson(constants, -1)});
   return words;
 }
 

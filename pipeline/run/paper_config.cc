@@ -207,8 +207,7 @@ std::vector<std::string> NotToTheLetter(const std::string& name, const JsonValue
   for (const auto& [option, published] : all.AsObject()) {
     const JsonValue* const value = values.Find(option);
     if (value != nullptr && !(*value == published))
-      differences.push_back("--" + option + " is " + Text(*value) + ", published " +
-                            Text(published));
+      differences.push_back(option + " is " + Text(*value) + ", published " + Text(published));
   }
   return differences;
 }

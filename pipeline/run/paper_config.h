@@ -42,7 +42,7 @@ void CheckPaper(const std::string& preset, const std::string& config, const std:
 // it, or where its value is not the base's: it was asked for.
 void ApplyPaperChoice(const PaperChoice& choice, OptionSet* options);
 
-// "--fit-rays is 64, published 5000" for each value that is not the configuration's.
+// "fit-rays is 64, published 5000" for each value that is not the configuration's.
 std::vector<std::string> NotToTheLetter(const std::string& name, const JsonValue& values);
 
 }  // namespace regrade

@@ -78,18 +78,18 @@ void ApplyField(const std::string& field, OptionSet* options) {
     ApplyKnown(FieldValues(field), "--fit-field", options);
 }
 
-// Refuses flags of a kind of field that the run does not fit. Without photos, --field is
-// another option.
-void RefuseFlagsOfOtherField(const OptionSet& options) {
+// Refuses flags and constants of a kind of field that the run does not fit. Without photos,
+// --field is another option.
+void RefuseFlagsOfOtherField(const OptionSet& options, const ConfigFile& config) {
   const JsonValue values = options.Values();
   const JsonValue* const field = values.Find("field");
   if (field == nullptr || values.Find("photo-size") == nullptr) return;
   const std::string& own = field->AsString();
   const JsonValue others = OptionsOfOtherFit(own);
   for (const auto& [name, value] : others.AsObject())
-    if (options.Given(name))
+    if (options.Given(name) || (!config.is_run && config.run.options.Find(name) != nullptr))
       throw UsageError(
-          "this run fits " + own, "--" + name,
+          "this run fits " + own, options.IsConstant(name) ? name : "--" + name,
           Concat("leave it out, or add --field ", own == "splats" ? "voxels" : "splats"));
 }
 
@@ -164,19 +164,19 @@ std::vector<std::string> ResolveSettings(const SettingsSources& sources, OptionS
   if (options->Values().Find("preset") != nullptr || !sources.run_json.empty())
     ApplyKnown(PresetValues(sources.preset, on_card), "--preset", options);
   const auto config = options->Given("config");
-  const RunFile given = config ? ReadRunFile(*config) : RunFile();
+  const ConfigFile given = config ? ReadConfig(*config) : ConfigFile();
   if (!sources.run_json.empty()) {
     RunFile file = ReadRunFile(sources.run_json);
-    file.options = OfFolder(file, sources, given.options, *options);
+    file.options = OfFolder(file, sources, given.run.options, *options);
     // Before there was a choice, runs had voxels.
     if (file.options.IsObject() && file.options.Find("field") == nullptr)
       file.options["field"] = "voxels";
     ApplyRunFile(file, sources.run_json, sources.taken, on_card, options);
     words = file.words;
   }
-  if (config) {
-    ApplyRunFile(given, *config, {}, on_card, options);
-    if (sources.run_json.empty()) words = given.words;
+  if (given.is_run) {
+    ApplyRunFile(given.run, given.name, {}, on_card, options);
+    if (sources.run_json.empty()) words = given.run.words;
   }
   if (const auto preset = options->Given("preset"))
     ApplyKnown(PresetValues(*preset, on_card), "--preset", options);
@@ -192,8 +192,9 @@ std::vector<std::string> ResolveSettings(const SettingsSources& sources, OptionS
   if (const auto field = options->Given("fit-field")) ApplyField(*field, options);
   if (options->Given("fit-resolutions"))
     ApplyKnown(JsonValue::Object{{"fit-fewer-stages", false}}, "--fit-resolutions", options);
+  if (config && !given.is_run) options->ApplyConfig(given.run.options, given.name);
   options->ApplyFlags();
-  RefuseFlagsOfOtherField(*options);
+  RefuseFlagsOfOtherField(*options, given);
   const JsonValue values = options->Values();
   const JsonValue *reproducible = values.Find("reproducible"), *device = values.Find("device");
   if (reproducible != nullptr && reproducible->AsBool() && device != nullptr &&

@@ -22,22 +22,45 @@ void CheckSchema(const JsonValue& run) {
       "", "run again with another --out, or delete the output folder");
 }
 
+RunFile RunFileOf(const JsonValue& value) {
+  CheckSchema(value);
+  RunFile file;
+  for (const JsonValue& word : value.At("arguments").AsArray())
+    file.words.push_back(word.AsString());
+  file.options = value.At("options");
+  return file;
+}
+
+// What `read` returns, and its errors as of usage.
+template <typename Read>
+auto FromUser(const std::string& name, const Read& read) {
+  try {
+    return read();
+  } catch (const Error& error) {
+    throw UsageError(
+        error.what_failed(), error.where().empty() ? name : error.where(),
+        error.hint().empty() ? "give a run.json that regrade wrote" : error.hint());
+  }
+}
+
 }  // namespace
 
 RunFile ReadRunFile(const std::string& path) {
-  try {
-    const JsonValue value = ReadJsonFile(path, kMaxRunFile, ExitCode::kUsage);
-    CheckSchema(value);
-    RunFile file;
-    for (const JsonValue& word : value.At("arguments").AsArray())
-      file.words.push_back(word.AsString());
-    file.options = value.At("options");
-    return file;
-  } catch (const Error& error) {
-    throw UsageError(
-        error.what_failed(), error.where().empty() ? path : error.where(),
-        error.hint().empty() ? "give a run.json that regrade wrote" : error.hint());
-  }
+  return FromUser(path,
+                  [&] { return RunFileOf(ReadJsonFile(path, kMaxRunFile, ExitCode::kUsage)); });
+}
+
+ConfigFile ReadConfig(const std::string& text) {
+  const bool is_file = !text.starts_with('{');
+  const std::string name = is_file ? text : "--config";
+  return FromUser(name, [&]() -> ConfigFile {
+    const JsonValue value = is_file ? ReadJsonFile(text, kMaxRunFile, ExitCode::kUsage)
+                                    : ParseJson(text, name, ExitCode::kUsage);
+    const bool of_options =
+        value.IsObject() && value.Find("schema") == nullptr && value.Find("options") == nullptr;
+    if (of_options) return {false, {{}, value}, name};
+    return {true, RunFileOf(value), name};
+  });
 }
 
 double StrengthOf(const std::string& style) {

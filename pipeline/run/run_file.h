@@ -16,6 +16,16 @@ struct RunFile {
 // Throws Error(kUsage) with line and column for what is not such a file, or of another schema.
 RunFile ReadRunFile(const std::string& path);
 
+// The value of --config: a run.json, or some options, {"name": value, ...}, in a file or as the
+// text itself.
+struct ConfigFile {
+  bool is_run = false;
+  RunFile run;       // of some options: without words
+  std::string name;  // for errors
+};
+// Throws as ReadRunFile.
+ConfigFile ReadConfig(const std::string& text);
+
 // The strength in run.json of a style's folder, 1 without that file. Throws Error(kUsage) for
 // one that --strength would not take.
 double StrengthOf(const std::string& style);

@@ -126,8 +126,8 @@ void CheckTogether(const RunSettings& settings) {
                      "--fit-resolutions and --fit-steps",
                      "give both the same number of stages");
   for (const auto& [sides, flag] :
-       {std::pair{&settings.fit.resolutions_y, "--fit-resolutions-y"},
-        std::pair{&settings.fit.resolutions_z, "--fit-resolutions-z"}})
+       {std::pair{&settings.fit.resolutions_y, "fit-resolutions-y"},
+        std::pair{&settings.fit.resolutions_z, "fit-resolutions-z"}})
     if (!sides->empty() && (settings.fit.adaptive() || sides->size() != grids))
       throw UsageError(
           Concat("belongs to a uniform field, with a side for each of ", grids, " stages"),

@@ -44,7 +44,8 @@ struct PoseOptions {
          .help = "match all pairs of up to this many photos; with more photos, match each with "
                  "its neighbours in the order of names",
          .min = 2,
-         .max = 10000});
+         .max = 10000,
+         .constant = true});
     bind("pose-min-registered", min_registered,
          {.help = "least fraction of the photos that must be registered", .min = 0, .max = 1});
     bind("pose-min-photos", min_photos,
@@ -61,10 +62,12 @@ struct PoseOptions {
          {.unit = "minutes",
           .help = "stop COLMAP if it prints nothing for this long; 0 has no limit",
           .min = 0,
-          .max = 1e6});
+          .max = 1e6,
+          .constant = true});
     bind("pose-free-focal", free_focal,
          {.help = "also refine focal lengths, by one factor per camera, where given poses are "
-                  "refined"});
+                  "refined",
+          .constant = true});
     bind("tracks", tracks,
          {.help =
               "tracks for given poses without points: auto finds them with COLMAP (0.5 to 1 s "

@@ -80,7 +80,7 @@ std::string NoteOfAdapting(const FitOptions& asked, const FitOptions& adapted) {
   if (!asked.adaptive() || asked.max_cells <= adapted.max_cells) return "";
   return Format("the photos face one way, so the field has at most %g million cells",
                 double{adapted.max_cells}) +
-         " (--fit-max-forward-cells)";
+         " (fit-max-forward-cells)";
 }
 
 }  // namespace regrade

@@ -120,7 +120,7 @@ class CudaFitEngine : public FitEngine {
                   std::string("no voxel of the scene is left: none has a ") +
                       (limits.by_density ? "density" : "rendering weight") + " above " +
                       std::to_string(threshold),
-                  "reconstruct", "check the poses, or lower --prune-weight");
+                  "reconstruct", "check the poses, or lower prune-weight by --config");
     next.spheres = Resampled(std::move(grid_.spheres), sphere_resolution);
     grid_ = std::move(next);
     Renew();

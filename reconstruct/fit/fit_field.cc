@@ -237,7 +237,7 @@ class Fitter {
   [[noreturn]] void ThrowEmpty() const {
     throw Error(ExitCode::kScene,
                 "no cell of the scene is left: none has enough weight in any view",
-                "reconstruct", "check the poses, or lower --prune-weight");
+                "reconstruct", "check the poses, or lower prune-weight by --config");
   }
 
   int LeadSteps() const {
@@ -277,7 +277,7 @@ class Fitter {
                     next, sphere_resolution);
   }
 
-  // How many vertices may stay on a grid of `now` so that --fit-max-voxels are left on `next`,
+  // How many vertices may stay on a grid of `now` so that fit-max-voxels are left on `next`,
   // whose vertices are closer; 0: any number.
   int64_t MostVoxelsBefore(const Vec3i& now, const Vec3i& next) const {
     if (options_.max_voxels == 0) return 0;

@@ -68,7 +68,7 @@ struct FitHooks {
 };
 
 // EQ(exponential-rate): rate(p) = begin^(1 - p) end^p, p the fraction of all steps done, or of
-// --fit-rate-steps; from p = 1 on it stays at `end`.
+// fit-rate-steps; from p = 1 on it stays at `end`.
 float ExponentialRate(float begin, float end, double p);
 // Rises along a sine from 1/100 at step 0 to 1 at step `delay`.
 float DelayFactor(int step, float delay);

@@ -84,7 +84,7 @@ struct FitOptions {
     bind("fit-resolutions", resolutions,
          {.unit = "voxels",
           .help = "longest side of the grid in each stage, coarse to fine; an adaptive field "
-                  "doubles it in each stage, and its memory grows with --fit-max-cells",
+                  "doubles it in each stage, and its memory grows with fit-max-cells",
           .min = 8,
           .max = 2048});
     bind(
@@ -94,16 +94,19 @@ struct FitOptions {
                  "axis; none: as the box's sides",
          .min = 2,
          .max = 2048,
-         .may_be_empty = true});
+         .may_be_empty = true,
+         .constant = true});
     bind("fit-resolutions-z", resolutions_z,
          {.unit = "voxels",
           .help = "the same of the z axis",
           .min = 2,
           .max = 2048,
-          .may_be_empty = true});
+          .may_be_empty = true,
+          .constant = true});
     bind("fit-fewer-stages", fewer_stages,
          {.help = "leaves out last stages that are finer than the photos can determine; giving "
-                  "--fit-resolutions switches it off"});
+                  "--fit-resolutions switches it off",
+          .constant = true});
     bind("fit-steps", steps,
          {.unit = "steps",
           .help = "optimizer steps in each stage; time grows with their sum",
@@ -113,13 +116,15 @@ struct FitOptions {
          {.unit = "rays",
           .help = "rays per step; 0: 4096, on a card more for captures of many pixels",
           .min = 0,
-          .max = 1 << 22});
+          .max = 1 << 22,
+          .constant = true});
     bind("fit-patch", patch,
          {.unit = "pixels",
           .help = "side of the pixel squares that rays are drawn in: larger is faster (rays "
                   "share cached voxels) but less accurate; a GPU draws single pixels",
           .min = 1,
-          .max = 32});
+          .max = 32,
+          .constant = true});
     bind("sh-degree", sh_degree,
          {.help = "view dependence: spherical harmonics degree 0, 1 or 2 (1, 4, 9 values per "
                   "channel); a small trial falls back to 0 where that loses nothing",
@@ -127,185 +132,240 @@ struct FitOptions {
           .max = 2});
     bind("fit-mean-bound", bound_mean,
          {.help = "keeps the mean colour of a voxel within [0, 1], and that of background "
-                  "layers"});
+                  "layers",
+          .constant = true});
     bind("fit-view-bound", view_bound,
          {.help = "largest view-dependent coefficient; limits coefficients that are hidden by "
                   "clamping and would appear after restyling",
           .min = 0,
-          .max = 1e6});
+          .max = 1e6,
+          .constant = true});
     bind("fit-step-size", step,
          {.unit = "voxels",
           .help = "distance of samples along a ray; 0.5 takes twice as long as 1 and gained "
                   "nothing on real photos",
           .min = 0.1,
-          .max = 4});
+          .max = 4,
+          .constant = true});
     bind("fit-stop", stop_transmittance,
          {.help = "transmittance at which a ray ends; the error per channel is at most this",
           .min = 0,
-          .max = 0.1});
+          .max = 0.1,
+          .constant = true});
     bind("fit-rate-density", rate_density,
          {.help = "RMSProp learning rate of densities at the start; auto: 58, of photos that "
                   "face one way 12",
           .min = 0,
-          .max = 1e4});
+          .max = 1e4,
+          .constant = true});
     bind(
         "fit-rate-density-end", rate_density_end,
         {.help = "learning rate of densities at the end (exponential in between); auto: 24, of "
                  "photos that face one way 2",
          .min = 0,
-         .max = 1e4});
+         .max = 1e4,
+         .constant = true});
     bind("fit-rate-steps", rate_steps,
          {.unit = "steps",
           .help = "learning rates reach their ends after so many steps, even if the fit ends "
                   "before; 0: at its end",
           .min = 0,
-          .max = 10000000});
+          .max = 10000000,
+          .constant = true});
     bind("fit-density-delay", density_delay,
          {.unit = "fraction of all steps",
           .help = "raises the learning rate of densities along a sine, from a hundredth to its "
                   "full value: colours settle before surfaces, and less fog remains",
           .min = 0,
-          .max = 1});
+          .max = 1,
+          .constant = true});
     bind("fit-rate-sh", rate_sh,
-         {.help = "RMSProp learning rate of colours at the start", .min = 0, .max = 10});
-    bind("fit-rate-sh-end", rate_sh_end,
-         {.help = "learning rate of colours at the end", .min = 0, .max = 10});
+         {.help = "RMSProp learning rate of colours at the start",
+          .min = 0,
+          .max = 10,
+          .constant = true});
+    bind(
+        "fit-rate-sh-end", rate_sh_end,
+        {.help = "learning rate of colours at the end", .min = 0, .max = 10, .constant = true});
     bind("tv-density", tv_density,
          {.help =
               "weight of the total variation of densities: smoother surfaces, fewer floaters; "
               "auto: 0.05, of transparent photos 0.002",
           .min = 0,
-          .max = 10});
+          .max = 10,
+          .constant = true});
     bind(
         "tv-sh", tv_sh,
         {.help = "weight of the total variation of colours; auto: 0.004, of transparent photos "
                  "0.00016",
          .min = 0,
-         .max = 10});
+         .max = 10,
+         .constant = true});
     bind("tv-decay", tv_decay,
          {.help = "factor on the weights of total variation at each finer stage",
           .min = 0,
-          .max = 1});
+          .max = 1,
+          .constant = true});
     bind("tv-fraction", tv_fraction,
-         {.help = "fraction of the voxels regularised in a step", .min = 0, .max = 1});
+         {.help = "fraction of the voxels regularised in a step",
+          .min = 0,
+          .max = 1,
+          .constant = true});
     bind("beta-loss", beta_loss,
-         {.help = "weight of a loss that makes rays opaque or clear", .min = 0, .max = 10});
+         {.help = "weight of a loss that makes rays opaque or clear",
+          .min = 0,
+          .max = 10,
+          .constant = true});
     bind("sparsity-loss", sparsity_loss,
          {.help = "weight of a loss on the densities of a ray's samples; not divided by the "
                   "rays",
           .min = 0,
-          .max = 10});
-    bind(
-        "prune-by", prune_by,
-        {.help = "removes voxels of a uniform field between stages whose rendering weight is "
-                 "below --prune-weight / resolution in every view (weight), / the next stage's "
-                 "resolution along z (weight-of-next), or whose density is below "
-                 "--prune-weight (density)",
-         .choices = "weight|weight-of-next|density"});
+          .max = 10,
+          .constant = true});
+    bind("prune-by", prune_by,
+         {.help = "removes voxels of a uniform field between stages whose rendering weight is "
+                  "below prune-weight / resolution in every view (weight), / the next stage's "
+                  "resolution along z (weight-of-next), or whose density is below "
+                  "prune-weight (density)",
+          .choices = "weight|weight-of-next|density",
+          .constant = true});
     bind("prune-weight", prune_weight,
-         {.help = "the limit of --prune-by; an adaptive field has weights",
+         {.help = "the limit of prune-by; an adaptive field has weights",
           .min = 0,
-          .max = 100});
+          .max = 100,
+          .constant = true});
     bind("prune-last", prune_last,
          {.help =
               "prunes after the last stage, too: smaller files, and less fog in local edits; "
-              "views between the photos lose a little"});
+              "views between the photos lose a little",
+          .constant = true});
     bind("fit-max-voxels", max_voxels,
          {.unit = "millions of voxels",
           .help = "uniform field: pruning raises its limit where more would be kept; 0: never",
           .min = 0,
-          .max = 2000});
+          .max = 2000,
+          .constant = true});
     bind("fit-initial-views", initial_views,
          {.unit = "photos",
           .help = "stores what so many photos see; 0 stores the whole box",
           .min = 0,
-          .max = 100});
+          .max = 100,
+          .constant = true});
     bind("initial-density", initial_density,
-         {.unit = "1/radius", .help = "initial density everywhere", .min = 0, .max = 100});
+         {.unit = "1/radius",
+          .help = "initial density everywhere",
+          .min = 0,
+          .max = 100,
+          .constant = true});
     bind("background-layers", background_layers,
          {.unit = "spheres",
           .help = "layers of the background, if the scene needs one; time and memory grow with "
                   "them",
           .min = 2,
-          .max = 512});
+          .max = 512,
+          .constant = true});
     bind("background-resolution", background_resolution,
          {.unit = "texels",
           .help = "texels from pole to pole of a background sphere in the last stage; memory "
                   "grows with its square",
           .min = 16,
-          .max = 4096});
+          .max = 4096,
+          .constant = true});
     bind("background-grows", background_grows,
-         {.help = "the background's resolution grows from stage to stage, as the grid's"});
+         {.help = "the background's resolution grows from stage to stage, as the grid's",
+          .constant = true});
     bind("background-rate-density", rate_background_density,
          {.help = "RMSProp learning rate of the background's densities at the start",
           .min = 0,
-          .max = 1e4});
+          .max = 1e4,
+          .constant = true});
     bind("background-rate-density-end", rate_background_density_end,
          {.help = "learning rate of the background's densities at the end",
           .min = 0,
-          .max = 1e4});
+          .max = 1e4,
+          .constant = true});
     bind("background-rate-color", rate_background_color,
          {.help = "RMSProp learning rate of the background's colours at the start",
           .min = 0,
-          .max = 10});
+          .max = 10,
+          .constant = true});
     bind("background-rate-color-end", rate_background_color_end,
-         {.help = "learning rate of the background's colours at the end", .min = 0, .max = 10});
+         {.help = "learning rate of the background's colours at the end",
+          .min = 0,
+          .max = 10,
+          .constant = true});
     bind("background-tv-density", tv_background_density,
          {.help = "weight of the total variation of the background's densities",
           .min = 0,
-          .max = 10});
+          .max = 10,
+          .constant = true});
     bind("background-tv-color", tv_background_color,
          {.help = "weight of the total variation of the background's colours",
           .min = 0,
-          .max = 10});
+          .max = 10,
+          .constant = true});
     bind("background-tv-fraction", tv_background_fraction,
-         {.help = "fraction of the background regularised in a step", .min = 0, .max = 1});
+         {.help = "fraction of the background regularised in a step",
+          .min = 0,
+          .max = 1,
+          .constant = true});
     bind("background-tv-decays", tv_background_decays,
-         {.help = "applies --tv-decay to the background, too"});
+         {.help = "applies tv-decay to the background, too", .constant = true});
     bind("background-initial-density", initial_background_density,
-         {.help = "initial density of all background layers", .min = 0, .max = 100});
+         {.help = "initial density of all background layers",
+          .min = 0,
+          .max = 100,
+          .constant = true});
     bind("background-lead", background_lead,
          {.unit = "fraction of the first stage",
           .help = "time in which only the background is fitted",
           .min = 0,
-          .max = 0.9});
+          .max = 0.9,
+          .constant = true});
     bind("fit-cell-pixels", cell_pixels,
          {.unit = "pixels",
           .help =
               "adaptive field: cells that only one photo sees wider than this are not halved",
           .min = 0.1,
-          .max = 100});
+          .max = 100,
+          .constant = true});
     bind("fit-max-cells", max_cells,
          {.unit = "millions of cells",
           .help = "adaptive field: where more would be halved, those that explain the largest "
-                  "errors are; see --fit-max-forward-cells",
+                  "errors are; see fit-max-forward-cells",
           .min = 0.001,
-          .max = 200});
+          .max = 200,
+          .constant = true});
     bind("fit-max-forward-cells", max_forward_cells,
          {.unit = "millions of cells",
           .help = "adaptive field: a forward-facing capture has at most this many cells",
           .min = 0.001,
-          .max = 200});
+          .max = 200,
+          .constant = true});
     bind(
         "fit-outward", outward,
         {.unit = "doublings",
          .help = "adaptive field: the region around the scene's box is 2^N times as wide, with "
                  "cells as much wider, for what photos show behind the scene",
          .min = 0,
-         .max = 5});
+         .max = 5,
+         .constant = true});
     bind("fit-free-space", free_space,
          {.help = "adaptive field: keeps the space clear between cameras and the points they "
                   "saw; less fog where few photos look; auto: 0.02, of photos that face one "
                   "way 0",
           .min = 0,
-          .max = 10});
+          .max = 10,
+          .constant = true});
     bind("fit-shards", shards,
          {.help = "gradient arenas; 0: one per thread, or 4 with --reproducible",
           .min = 0,
-          .max = 64});
+          .max = 64,
+          .constant = true});
     bind("fit-exact-sums", exact_sums,
          {.help = "GPU: sums gradients as integers, so that two fits of the same photos are "
-                  "bitwise equal; slower, and a third more memory"});
+                  "bitwise equal; slower, and a third more memory",
+          .constant = true});
   }
 };
 

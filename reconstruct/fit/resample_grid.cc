@@ -178,7 +178,7 @@ FastGrid Resample(const FastGrid& grid, const Buffer<float>& weights, float thre
                                        ? 0.0f
                                        : *std::max_element(weights.begin(), weights.end())) +
                     ")",
-                "reconstruct", "check the poses, or lower --prune-weight");
+                "reconstruct", "check the poses, or lower prune-weight by --config");
   const int lanes = grid.lanes();
   result.records.Resize(count * lanes);
 #pragma omp parallel for schedule(static)

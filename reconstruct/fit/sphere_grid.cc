@@ -74,7 +74,7 @@ void LinkColumns(FastSpheres* spheres, const Stored& stored) {
     throw Error(
         ExitCode::kResources,
         "the background would have " + std::to_string(map * spheres->layers) + " texels",
-        "reconstruct", "use a smaller --background-resolution");
+        "reconstruct", "use a smaller background-resolution by --config");
   spheres->texels.Resize(4 * columns * spheres->layers);
 }
 

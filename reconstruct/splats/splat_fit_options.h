@@ -53,19 +53,22 @@ struct SplatFitOptions {
          {.help = "weight of the mean opacity in the loss: larger values leave fewer "
                   "half-transparent splats",
           .min = 0,
-          .max = 10});
+          .max = 10,
+          .constant = true});
     bind("splat-scale-weight", scale_weight,
          {.help = "weight of the mean scale in the loss: larger values leave smaller splats",
           .min = 0,
-          .max = 10});
+          .max = 10,
+          .constant = true});
     bind("splat-small-until", small_until,
          {.unit = "fraction of all steps",
           .help = "photos have half their size until then",
           .min = 0,
-          .max = 1});
-    bind(
-        "splat-antialiased", antialiased,
-        {.help = "lowers the opacity of splats that are smaller than a pixel (Mip-Splatting)"});
+          .max = 1,
+          .constant = true});
+    bind("splat-antialiased", antialiased,
+         {.help = "lowers the opacity of splats that are smaller than a pixel (Mip-Splatting)",
+          .constant = true});
   }
 };
 

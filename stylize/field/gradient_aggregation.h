@@ -51,15 +51,18 @@ struct AggregationOptions {
          {.help = "samples of less weight are dropped in training: faster, and off by at most "
                   "the sum of their weights",
           .min = 0,
-          .max = 0.1});
+          .max = 0.1,
+          .constant = true});
     bind("style-max-transmittance", max_transmittance,
          {.help = "rays that transmit more light than this are left out of training; 1 keeps "
                   "all",
           .min = 0,
-          .max = 1});
+          .max = 1,
+          .constant = true});
     bind("style-one-sided", one_sided,
          {.help = "a colour beyond 0 or 1 is no error where its target is 0 or 1: pictures "
-                  "clip both"});
+                  "clip both",
+          .constant = true});
     bind("style-view-weight", view_weight,
          {.help = "penalty on restyled colours that change with the viewing direction: 0 "
                   "follows a 2D method that maps each view differently, and flickers more; "
@@ -69,10 +72,12 @@ struct AggregationOptions {
     bind("style-every-voxel", every_voxel,
          {.help = "sends every voxel through the network at each step, as the paper's "
                   "Algorithm 1, instead of those that the step's rays touch: same result, "
-                  "slower; for timing"});
+                  "slower; for timing",
+          .constant = true});
     bind("style-exact-sums", exact_sums,
          {.help = "GPU: sums colours and gradients as integers, so that two trainings on the "
-                  "same card are bitwise equal; slower, and more memory"});
+                  "same card are bitwise equal; slower, and more memory",
+          .constant = true});
   }
 };
 

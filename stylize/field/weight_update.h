@@ -35,30 +35,40 @@ struct WeightUpdateOptions {
           .help = "training steps of the style's network; time is proportional",
           .min = 1,
           .max = 1e6});
-    bind("style-rate", rate_first, {.help = "initial learning rate", .min = 0, .max = 1});
+    bind("style-rate", rate_first,
+         {.help = "initial learning rate", .min = 0, .max = 1, .constant = true});
     bind("style-rate-last", rate_last,
-         {.help = "final learning rate, reached along a cosine", .min = 0, .max = 1});
+         {.help = "final learning rate, reached along a cosine",
+          .min = 0,
+          .max = 1,
+          .constant = true});
     bind("style-lambda", lambda,
          {.help = "weight of the Lipschitz regularisation against the mean squared error",
           .min = 0,
-          .max = 1e3});
+          .max = 1e3,
+          .constant = true});
     bind("style-norm-steps", norm_steps,
          {.unit = "steps",
           .help = "steps of the power iteration before each training step",
           .min = 1,
-          .max = 1000});
+          .max = 1000,
+          .constant = true});
     bind("style-settle-norms", settle_norms,
          {.help = "lets the power iteration settle at the start, at the end, and where its "
-                  "estimate lags behind the weights"});
+                  "estimate lags behind the weights",
+          .constant = true});
     bind("style-hidden-bias", hidden_bias,
-         {.help = "hidden layers have biases; LipRF's proposition on networks assumes none"});
+         {.help = "hidden layers have biases; LipRF's proposition on networks assumes none",
+          .constant = true});
     bind("style-no-regularisation", no_regularisation,
          {.help = "ablation: no Lipschitz regularisation: closer to the 2D method, and noisier "
-                  "where its views disagree; only --style-bound limits the bound"});
+                  "where its views disagree; only --style-bound limits the bound",
+          .constant = true});
     bind(
         "style-spectral-normalisation", spectral_normalisation,
         {.help = "ablation: every layer's norm is 1, which is the bound of the paper's recipe; "
-                 "smoothest, and weakest in colour"});
+                 "smoothest, and weakest in colour",
+         .constant = true});
   }
 };
 

@@ -50,7 +50,7 @@ class MixtureTransfer : public ViewStylizer {
     if (of_scene_.slope_before > options_.max_slope)
       notices.push_back(
           Format("the map between all photos' colours and the style's would be steeper than "
-                 "--max-slope %.3g: the photos' colour groups are widened until it is %.2f",
+                 "max-slope %.3g: the photos' colour groups are widened until it is %.2f",
                  options_.max_slope, of_scene_.slope));
     return notices;
   }

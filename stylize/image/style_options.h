@@ -42,12 +42,14 @@ struct StyleOptions {
     bind("style-parts", parts,
          {.help = "groups of colours of method gmm, fewer where a picture has fewer",
           .min = 1,
-          .max = 16});
+          .max = 16,
+          .constant = true});
     bind("max-slope", max_slope,
          {.help = "how many times method gmm may magnify a difference of colours at most: "
                   "groups are widened where it would be more, which makes them less distinct",
           .min = 1.5,
-          .max = 100});
+          .max = 100,
+          .constant = true});
     bind("height-weight", height_weight,
          {.help = "how much the height in the picture counts, beside colour, when method gmm "
                   "chooses groups of the style for a group of the photos, so that a sky takes "
@@ -56,7 +58,10 @@ struct StyleOptions {
           .min = 0,
           .max = 10});
     bind("style-iterations", iterations,
-         {.help = "rotations of method idt; its time grows with them", .min = 1, .max = 200});
+         {.help = "rotations of method idt; its time grows with them",
+          .min = 1,
+          .max = 200,
+          .constant = true});
     bind("style-regrain", regrain,
          {.help = "with idt and histogram: restores the photo's grain and edges, which the "
                   "transfer amplifies; takes about a second for a view of a megapixel, and "
@@ -66,7 +71,8 @@ struct StyleOptions {
           .help = "longer side at which networks see a picture; memory and time grow "
                   "with its square",
           .min = 64,
-          .max = 8192});
+          .max = 8192,
+          .constant = true});
     bind("style-command-limit", command_limit_s,
          {.unit = "s",
           .help = "longest time that command:... may take for one view",

@@ -77,7 +77,7 @@ class Training {
     return engine_.loss()->Run(network, sample_, nullptr);
   }
   ColorMap ChooseBase();
-  // Of those that --style-base and the bound allow; mse of the sample.
+  // Of those that style-base and the bound allow; mse of the sample.
   ColorMap BetterMap(double* mse);
   // What the colour map leaves of the bound to the residual.
   void LimitResidual();
@@ -276,7 +276,7 @@ TrainNetworkResult TrainNetwork(const RadianceField& field,
           Concat("style training stopped at step ", training.steps_done() - 1,
                  ": two steps in a row were not finite, first in ",
                  FirstNonFinite(training.network(), steps.gradient, steps.last.loss)),
-          "", "lower --style-rate; the state before it was kept");
+          "", "lower style-rate by --config; the state before it was kept");
     }
     const LoopControl control =
         Report(hooks.progress, training.steps_done(), options.steps,

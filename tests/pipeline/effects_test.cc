@@ -46,9 +46,10 @@ Reconstruction Reconstruct(const std::string& capture, const std::string& out,
                            const std::vector<std::string>& size,
                            const std::vector<std::string>& more = {}) {
   ChildOptions options;
-  options.argv = {REGRADE_PROGRAM,  "reconstruct", capture,  "--out",      out,
-                  "--reproducible", "--field",     "voxels", "--fit-rays", "2048",
-                  "--fit-field",    "uniform"};
+  options.argv = {
+      REGRADE_PROGRAM,  "reconstruct", capture,  "--out",    out,
+      "--reproducible", "--field",     "voxels", "--config", R"({"fit-rays": 2048})",
+      "--fit-field",    "uniform"};
   options.argv.insert(options.argv.end(), size.begin(), size.end());
   options.argv.insert(options.argv.end(), more.begin(), more.end());
   options.wall_limit_s = 300;

@@ -45,7 +45,7 @@ double Psnr(const RadianceField& a, const RadianceField& b) {
 
 // Random values have the errors of rounding and no neighbours alike: the worst case for bytes,
 // and for decibels, since a random coefficient is as large as a sample's colour; those that
-// change with the view are kept within what `--fit-view-bound` of the presets allows. Channels
+// change with the view are kept within what `fit-view-bound` of the presets allows. Channels
 // and harmonics that are not alike need the most bits: with 27 of them 128 do not suffice for
 // the 48 dB that scenes have.
 TEST(PageCodec, DecodedFieldRendersAsTheExactOne) {

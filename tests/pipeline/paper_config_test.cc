@@ -220,7 +220,7 @@ TEST(PaperConfig, TheChoiceKeepsWhatWasSetByHand) {
     EXPECT_EQ(bound.settings.scene.photo_size, 1008);
     const auto differences = NotToTheLetter("llff", DecidedValues(bound.settings));
     ASSERT_EQ(differences.size(), 1u);
-    EXPECT_EQ(differences[0].find("--fit-steps is ["), 0u) << differences[0];
+    EXPECT_EQ(differences[0].find("fit-steps is ["), 0u) << differences[0];
     EXPECT_NE(differences[0].find("published [38400"), std::string::npos);
   }
 }
@@ -234,8 +234,9 @@ TEST(PaperConfig, ContradictionsAreRefused) {
   EXPECT_REGRADE_ERROR(Of({"--paper-config", "llff"}), ExitCode::kUsage, "--preset paper");
   EXPECT_REGRADE_ERROR(Of({"--preset", "paper", "--paper-config", "co3d"}), ExitCode::kUsage,
                        "llff");
-  EXPECT_REGRADE_ERROR(Of({"--field", "voxels", "--fit-resolutions-y", "64,64,64,64,64"}),
-                       ExitCode::kUsage, "uniform");
+  EXPECT_REGRADE_ERROR(
+      Of({"--field", "voxels", "--config", R"({"fit-resolutions-y": [64, 64, 64, 64, 64]})"}),
+      ExitCode::kUsage, "uniform");
 }
 
 // Another preset undoes all of it.

@@ -61,10 +61,20 @@ void SynthWithAThing(const TemporaryFolder& folder) {
 
 void Reconstruct(const std::string& capture, const std::string& out, const std::string& steps,
                  std::vector<std::string> more) {
-  std::vector<std::string> words = {"reconstruct",       capture, "--out",       out,
-                                    "--tracks",          "given", "--field",     "voxels",
-                                    "--fit-resolutions", "24,48", "--fit-steps", steps,
-                                    "--fit-rays",        "2048"};
+  std::vector<std::string> words = {"reconstruct",
+                                    capture,
+                                    "--out",
+                                    out,
+                                    "--tracks",
+                                    "given",
+                                    "--field",
+                                    "voxels",
+                                    "--fit-resolutions",
+                                    "24,48",
+                                    "--fit-steps",
+                                    steps,
+                                    "--config",
+                                    R"({"fit-rays": 2048})"};
   words.insert(words.end(), more.begin(), more.end());
   Said(words);
 }

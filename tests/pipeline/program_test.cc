@@ -69,6 +69,8 @@ TEST(Program, HelpAndVersion) {
   EXPECT_SAYS(all, "--photo-size");
   EXPECT_SAYS(all, "default 800");
   EXPECT_SAYS(all, "--no-NAME");
+  EXPECT_EQ(all.text.find("fit-rays"), std::string::npos);  // a constant
+  EXPECT_SAYS(Regrade({"run", "--help-constants"}), "\n  fit-rays N");
 }
 
 // A command's own options are in its short help, and those that it ignores are not.

@@ -119,7 +119,7 @@ TEST(ResolveSettings, LaterSourcesOverrideEarlierOnes) {
   // A field of another kind brings its rates and regularisers, and nothing over a flag.
   FitOptions uniform;
   uniform.MakeUniform();
-  r = Resolve({"--field", "voxels", "--fit-field", "uniform", "--tv-sh", "0.5"});
+  r = Resolve({"--field", "voxels", "--fit-field", "uniform", "--config", R"({"tv-sh": 0.5})"});
   EXPECT_EQ(r.settings.fit.rate_density, uniform.rate_density);
   EXPECT_EQ(r.settings.fit.tv_sh, 0.5f);
   EXPECT_EQ(r.settings.fit.resolutions, FitOptions().resolutions);
@@ -131,7 +131,7 @@ TEST(ResolveSettings, LaterSourcesOverrideEarlierOnes) {
   EXPECT_EQ(r.settings.fit.rate_density, 30.0f);  // its own: the field is uniform there, too
   r = Resolve({"--preset", "paper", "--fit-field", "adaptive"});
   EXPECT_EQ(r.settings.fit.rate_density, std::nullopt);
-  r = Resolve({"--field", "voxels", "--tv-density", "0.05"});
+  r = Resolve({"--field", "voxels", "--config", R"({"tv-density": 0.05})"});
   EXPECT_EQ(r.settings.fit.tv_density, 0.05f);
 
   r = Resolve({"--preset", "best", "--photo-size", "320", "--recipe", "paper"}, sources);
@@ -158,6 +158,26 @@ TEST(ResolveSettings, FlagsOfTheOtherKindOfFieldAreRefused) {
   const std::string run = folder / "run.json";
   WriteText(run, R"({"arguments": ["/photos"], "options": {"preset": "draft"}})");
   EXPECT_EQ(Resolve({}, {.run_json = run}).settings.scene.field, "voxels");
+}
+
+// Constants come from --config alone: over presets and recipes, whichever comes first.
+TEST(ResolveSettings, ConstantsAreNoFlags) {
+  EXPECT_REGRADE_ERROR(Resolve({"--field", "voxels", "--tv-sh", "0.5"}), ExitCode::kUsage,
+                       R"(--config '{"tv-sh":0.5}')");
+  EXPECT_REGRADE_ERROR(Resolve({"--config", R"({"tv-sh": 0.5})"}), ExitCode::kUsage,
+                       "--field voxels");
+  EXPECT_REGRADE_ERROR(Resolve({"--config", R"({"style-ratio": 0.5})"}), ExitCode::kUsage,
+                       "style-rate");
+  EXPECT_EQ(Resolve({"--config", R"({"style-rays": 99})", "--recipe", "paper"})
+                .settings.network.rays_per_step,
+            99);
+  const TemporaryFolder folder;
+  WriteText(folder / "some.json", R"({"style-rays": 98, "splat-steps": 7})");
+  const RunSettings settings =
+      Resolve({"--config", folder / "some.json", "--preset", "best", "--splat-steps", "8"})
+          .settings;
+  EXPECT_EQ(settings.network.rays_per_step, 98);
+  EXPECT_EQ(settings.splats.steps, 8);
 }
 
 TEST(ResolveSettings, RecipeSetsEveryOptionOfTheNetwork) {
@@ -191,9 +211,10 @@ TEST(ResolveSettings, H68_AReproducibleRunOnTheGpuHasExactSums) {
   };
   EXPECT_TRUE(both({"--reproducible", "--device", "cuda"}));
   EXPECT_TRUE(both({"--reproducible", "--device", "cuda", "--recipe", "paper"}));
-  EXPECT_TRUE(both({"--reproducible", "--device", "cuda", "--no-style-exact-sums"}));
-  EXPECT_TRUE(both({"--reproducible", "--device", "cuda", "--field", "voxels",
-                    "--no-fit-exact-sums", "--no-style-exact-sums"}));
+  EXPECT_TRUE(both(
+      {"--reproducible", "--device", "cuda", "--config", R"({"style-exact-sums": false})"}));
+  EXPECT_TRUE(both({"--reproducible", "--device", "cuda", "--field", "voxels", "--config",
+                    R"({"fit-exact-sums": false, "style-exact-sums": false})"}));
   EXPECT_FALSE(both({"--reproducible"}));  // on the CPU: device auto
   EXPECT_FALSE(both({"--reproducible", "--device", "cpu"}));
   EXPECT_FALSE(both({"--device", "cuda"}));

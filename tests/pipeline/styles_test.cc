@@ -364,7 +364,7 @@ TEST(StyledField, IsRemadeToTheBit) {
   const ProgramOutcome done =
       Regrade(RunOf(folder, "e",
                     {"--style", Asset("sunset"), "--keep-field", "--effects", "background=on",
-                     "--background-layers", "4", "--background-resolution", "16"},
+                     "--config", R"({"background-layers": 4, "background-resolution": 16})"},
                     "voxels"));
   ASSERT_EQ(done.code, 0) << done.text;
   const std::string style = folder / "e/styles/style_sunset";

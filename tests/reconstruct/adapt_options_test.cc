@@ -77,7 +77,7 @@ TEST(AdaptOptions, H192_NarrowCellsInDeviceCoordinates) {
   EXPECT_EQ(again.tv_density, forward.tv_density);
   EXPECT_EQ(NoteOfAdapting(options, forward),
             "the photos face one way, so the field has at most 12 million cells "
-            "(--fit-max-forward-cells)");
+            "(fit-max-forward-cells)");
   options.max_cells = 3;
   const FitOptions few = AdaptOptions(options, {.device_coordinates = true});
   EXPECT_EQ(few.max_cells, 3);

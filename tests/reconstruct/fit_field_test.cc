@@ -188,7 +188,7 @@ TEST(ExponentialRate, RunsFromBeginToEnd) {
   EXPECT_FLOAT_EQ(ExponentialRate(8, 0.5f, 0.5), 2);
   EXPECT_FLOAT_EQ(ExponentialRate(8, 0.5f, 1), 0.5f);
   EXPECT_EQ(ExponentialRate(0, 0.5f, 0.5), 0);
-  // A fit of more steps than --fit-rate-steps goes on at the last rate, as svox2's.
+  // A fit of more steps than fit-rate-steps goes on at the last rate, as svox2's.
   EXPECT_FLOAT_EQ(ExponentialRate(8, 0.5f, 3), 0.5f);
 }
 
@@ -206,7 +206,7 @@ TEST_F(FitField, H85_PruningEverythingIsAnError) {
     FAIL() << "a field without voxels was accepted";
   } catch (const Error& error) {
     EXPECT_EQ(error.code(), ExitCode::kScene);
-    EXPECT_NE(error.hint().find("--prune-weight"), std::string::npos);
+    EXPECT_NE(error.hint().find("prune-weight"), std::string::npos);
   }
 }
 

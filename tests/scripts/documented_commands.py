@@ -61,9 +61,9 @@ class Program:
             return f"no command '{command}'"
         for word in words[1:]:
             option = word[2:].split("=")[0]
-            if word.startswith("--") and not {option, option.removeprefix("no-")} & (known | {"help", "help-all"}):
+            if word.startswith("--") and not {option, option.removeprefix("no-")} & (known | {"help", "help-all", "help-constants"}):
                 return f"{command} has no option --{option}"
-        whole = len(words) > 1 and not {"--help", "--help-all"} & set(words)
+        whole = len(words) > 1 and not {"--help", "--help-all", "--help-constants"} & set(words)
         if whole and "dry-run" in known and not text.endswith("..."):
             done = self.run([*words, "--dry-run"])
             if done.returncode == USAGE:

@@ -5,7 +5,7 @@ import json
 import os
 import subprocess
 
-SMALL = ["--photo-size", "96", "--splat-steps", "200", "--splats", "2", "--style-steps", "20", "--style-rays", "512", "--film-seconds", "0.25", "--film-size", "96", "--preset", "draft", "--reproducible",
+SMALL = ["--photo-size", "96", "--splat-steps", "200", "--splats", "2", "--style-steps", "20", "--config", '{"style-rays": 512}', "--film-seconds", "0.25", "--film-size", "96", "--preset", "draft", "--reproducible",
          "--holdout", "0", "--tracks", "given"]
 STAGES = ("pose", "reconstruct", "style_2d", "stylize", "render", "evaluate", "report")
 STYLED = "styles/style_sunset"  # the folder of a run's style

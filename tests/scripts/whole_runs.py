@@ -52,7 +52,7 @@ def from_photos(regrade, work):
     shutil.copytree(os.path.join(work, "capture", "images"), photos)
     # Every eighth photo is held out; a field of this size reaches 20 dB there, a wrong pose costs more than 5 dB.
     run([regrade, "run", photos, "--style", STYLE, "--out", out, "--preset", "draft", "--device", "cpu", "--photo-size", "200",
-         "--splat-steps", "300", "--splats", "5", "--style-steps", "40", "--style-rays", "1024", *SHORT_FILM, "--film-size", "200", "--require", "reconstruct:psnr-heldout>=20,styled:tc-psnr:1>=20"])
+         "--splat-steps", "300", "--splats", "5", "--style-steps", "40", "--config", '{"style-rays": 1024}', *SHORT_FILM, "--film-size", "200", "--require", "reconstruct:psnr-heldout>=20,styled:tc-psnr:1>=20"])
     report = report_of(out)
     stages = report["stages"]
     expect(stages["pose"]["registered"] == views, f"COLMAP placed {stages['pose']['registered']} of {views} photos")

@@ -314,7 +314,7 @@ TEST(MixtureTransport, H185_ASteepMapIsWidenedAndSaid) {
   }
   const auto stylizer = MakeMixtureTransfer(Gmm(), style, colors);
   ASSERT_EQ(stylizer->Notices().size(), 1u);
-  EXPECT_NE(stylizer->Notices()[0].find("--max-slope 4"), std::string::npos);
+  EXPECT_NE(stylizer->Notices()[0].find("max-slope 4"), std::string::npos);
   EXPECT_TRUE(MakeMixtureTransfer(Gmm(), style, SampleColors(style, "", kMixtureSample))
                   ->Notices()
                   .empty());
