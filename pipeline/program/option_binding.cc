@@ -2,13 +2,13 @@
 
 #include <algorithm>
 #include <boost/program_options.hpp>
-#include <charconv>
 #include <cmath>
 #include <cstring>
 
 #include "kernels/base/error.h"
 #include "pipeline/files/text.h"
 #include "pipeline/program/nearest_name.h"
+#include "pipeline/program/option_values.h"
 
 namespace regrade {
 namespace {
@@ -17,92 +17,6 @@ namespace po = boost::program_options;
 using Words = std::vector<std::string>;
 
 constexpr const char* kAuto = "auto";
-
-// The shortest text that reads back as the same value, independent of the locale.
-template <typename T>
-std::string NumberText(T value) {
-  char text[64];
-  const auto result = std::to_chars(text, text + sizeof text, value);
-  return std::string(text, result.ptr);
-}
-
-// The double nearest to the float's shortest text: 0.1, not 0.10000000149.
-double ShortestDouble(float value) {
-  double nearest = 0;
-  const std::string text = NumberText(value);
-  std::from_chars(text.data(), text.data() + text.size(), nearest);
-  return nearest;
-}
-
-std::string BoundsText(const OptionInfo& info) {
-  const bool low = std::isfinite(info.min), high = std::isfinite(info.max);
-  if (low && high) return NumberText(info.min) + " to " + NumberText(info.max);
-  if (low) return "at least " + NumberText(info.min);
-  if (high) return "at most " + NumberText(info.max);
-  return "a number";
-}
-
-[[noreturn]] void RefuseValue(const std::string& where, const std::string& text,
-                              const std::string& allowed) {
-  throw UsageError("'" + text + "' is not allowed", where, "give " + allowed);
-}
-
-// The whole text must be one finite number within the bounds.
-template <typename T>
-T ParseNumber(const std::string& text, const OptionInfo& info, const std::string& where,
-              const std::string& or_else = "") {
-  T value{};
-  const char* end = text.data() + text.size();
-  const auto result = std::from_chars(text.data(), end, value);
-  const std::string allowed =
-      or_else + BoundsText(info) + (std::is_integral_v<T> ? ", a whole number" : "");
-  if (result.ec != std::errc() || result.ptr != end || text.empty())
-    RefuseValue(where, text, allowed);
-  if constexpr (std::is_floating_point_v<T>)
-    if (!std::isfinite(value)) RefuseValue(where, text, allowed);
-  // Bounds are doubles; whole numbers beyond 2^53 are compared after rounding.
-  if (!(static_cast<double>(value) >= info.min && static_cast<double>(value) <= info.max))
-    RefuseValue(where, text, allowed);
-  return value;
-}
-
-bool ParseSwitch(const std::string& text, const std::string& where) {
-  if (text == "true" || text == "on" || text == "yes") return true;
-  if (text == "false" || text == "off" || text == "no") return false;
-  RefuseValue(where, text, "true or false");
-}
-
-std::string ParseChoice(const std::string& text, const OptionInfo& info,
-                        const std::string& where) {
-  if (*info.choices == '\0') return text;
-  std::string listed;
-  for (const std::string& choice : Split(info.choices, '|')) {
-    if (choice == text) return text;
-    listed += (listed.empty() ? "" : ", ") + choice;
-  }
-  RefuseValue(where, text, "one of " + listed);
-}
-
-// The text of a JSON value as a flag's value.
-std::string FlagText(const JsonValue& value) {
-  if (value.IsString()) return value.AsString();
-  if (!value.IsArray()) return DumpJson(value, -1);
-  std::string text;
-  for (const JsonValue& element : value.AsArray()) {
-    if (!text.empty()) text += ',';
-    text += FlagText(element);
-  }
-  return text;
-}
-
-// {"name": value} with the value of a flag of that text.
-JsonValue AsConfig(const std::string& name, const std::string& text) {
-  try {
-    return JsonValue::Object{{name, ParseJson(text, "")}};  // a number, true or false
-  } catch (const Error&) {
-    return JsonValue::Object{{name, text}};
-  }
-}
 
 // The text behind the one of `beginnings` that it has, see OptionInfo::runs; nothing without.
 std::optional<std::string> Behind(const std::string& text, const char* beginnings) {
