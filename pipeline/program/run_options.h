@@ -66,12 +66,12 @@ struct RunOptions {
                   "view-dependence and pose-refinement"});
     bind("max-memory", max_memory_gb,
          {.unit = "GB", .help = kMaxMemoryHelp, .min = 0, .max = 1e6});
-    bind(
-        "reproducible", reproducible,
-        {.help = "gives the same bytes for any number of threads and any interruption, from "
-                 "finished poses on; slower. --device auto then means the CPU; with --device "
-                 "cuda --fit-exact-sums and --style-exact-sums are on, and the bytes are those "
-                 "of this card and build"});
+    bind("reproducible", reproducible,
+         {.help =
+              "gives the same bytes for any number of threads and any interruption, from "
+              "finished poses on; slower. --device auto then means the CPU; with --device "
+              "cuda --style-exact-sums is on, of voxels --fit-exact-sums, too, and the bytes "
+              "are those of this card and build"});
   }
 };
 
