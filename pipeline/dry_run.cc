@@ -11,30 +11,28 @@
 #include "pipeline/files/text.h"
 #include "pipeline/images/image_file.h"
 #include "pipeline/program/device_choice.h"
-#include "pipeline/run/fit_memory.h"
+#include "pipeline/run/fit_kind.h"
 #include "pipeline/run/paper_config.h"
 #include "pipeline/run/plan.h"
-#include "pipeline/stages/splat_views.h"
+#include "pipeline/stages/scene_source.h"
 #include "pipeline/stages/stages.h"
 #include "pipeline/workspace/folder_size.h"
 
 namespace regrade {
 namespace {
 
-constexpr double kReadSplatsSeconds = 5;  // and to measure them
-
 // One photo of the source stands for all; where it cannot be read, its size is a phone's.
 const CaptureSize& SizeOfSource(RunContext* context) {
   if (context->source_size) return *context->source_size;
-  if (context->FromSplats() && !HasPhotosOfSplats(*context))
-    return context->source_size.emplace(SizeOfSplatViews(*context));
+  const SceneSource& given = SourceOf(*context);
+  if (const auto size = given.size(*context)) return context->source_size.emplace(*size);
   const CaptureSource source = context->Source();
   const InputFiles inputs = InputsOf(source);
   CaptureSize size;
   size.photos = ExpectedPhotos(inputs, context->settings.ingest);
   size.placed = source.kind != CaptureKind::kPhotos;
-  size.lacks_points = LacksPoints(source.kind) && context->settings.pose.tracks == "auto" &&
-                      !context->FromSplats();
+  size.lacks_points =
+      LacksPoints(source.kind) && context->settings.pose.tracks == "auto" && !given.has_points;
   for (const InputFile& input : inputs.files) {
     if (input.kind != InputKind::kPhoto || !input.file.problem.empty()) continue;
     try {
@@ -88,9 +86,9 @@ std::vector<StageEstimate> ExpectedStages(RunContext* context) {
   std::vector<StageEstimate> stages = EstimateStages(
       settings, size, ChooseBackend(settings.run.device, settings.run.reproducible),
       omp_get_max_threads());
-  if (context->FromSplats())
+  if (const auto read_seconds = SourceOf(*context).read_seconds)
     for (StageEstimate& stage : stages)
-      if (stage.stage == "reconstruct") stage.seconds = kReadSplatsSeconds, stage.memory = 0;
+      if (stage.stage == "reconstruct") stage.seconds = *read_seconds, stage.memory = 0;
   if (!posed) return stages;
   const double pace = MeasuredPace(stages, MeasuredStages(*context->workspace));
   for (StageEstimate& stage : stages) stage.seconds *= pace;
@@ -125,7 +123,7 @@ void PlanNewScene(const std::string& last, RunContext* context) {
   SayPaperConfig(context);
   context->console->Info("from " + PoseStage(context).plan);
   PlanStages("pose", last, "", context);
-  if (last == "pose" || context->FromSplats()) return;
+  if (last == "pose" || SourceOf(*context).read_seconds) return;
   const Backend backend = ChooseBackend(settings.run.device, settings.run.reproducible);
   const CaptureSize size = SizeOfSource(context);
   const std::string warning =

@@ -4,7 +4,7 @@
 #include <memory>
 #include <vector>
 
-#include "kernels/base/error.h"
+#include "kernels/field/field_kind.h"
 
 namespace regrade {
 
@@ -35,9 +35,7 @@ void ToSphereGeometry(const FastSpheres& spheres, SphereGeometry* geometry,
 }
 
 FastGrid MakeFastGrid(const RadianceField& field) {
-  if (field.geometry->splats.on())
-    throw UsageError("this is done with voxels alone", "a field of splats",
-                     "fit the scene with --field voxels");
+  KindOf(*field.geometry).require_voxels();
   FastGrid grid;
   const Geometry& geometry = *field.geometry;
   grid.frame = geometry.frame;

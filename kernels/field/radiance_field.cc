@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "kernels/base/error.h"
-#include "kernels/field/cell_checks.h"
+#include "kernels/field/field_kind.h"
 #include "kernels/field/spherical_harmonics.h"
 
 namespace regrade {
@@ -22,45 +22,16 @@ int64_t CountNonFinite(const Buffer<float>& values) {
   return count;
 }
 
-void CheckFrame(const GridFrame& frame, bool voxels, const char* name) {
+void CheckFrame(const GridFrame& frame, int least_side, const char* name) {
   for (int a = 0; a < 3; ++a) {
-    if (voxels && frame.resolution[a] < 2)
+    if (frame.resolution[a] < least_side)
       Refuse(name, "the grid has " + std::to_string(frame.resolution[a]) +
-                       " vertices along an axis, at least 2 are needed");
+                       " vertices along an axis, at least " + std::to_string(least_side) +
+                       " are needed");
     if (!(frame.radius[a] > 0) || !std::isfinite(frame.radius[a]) ||
         !std::isfinite(frame.center[a]))
       Refuse(name, "the box has a radius or centre that is not a finite, positive length");
   }
-}
-
-// A corner or a child out of range would be an access out of bounds. The tree is derived, so it
-// is not checked.
-void CheckCells(const Geometry& geometry, const char* name) {
-  const CellGrid& cells = geometry.cells;
-  const int64_t n = cells.num_cells();
-  const std::string defect = DefectOfCells(cells, geometry.frame.resolution);
-  if (!defect.empty()) Refuse(name, defect);
-  if (cells.corner.size() != 8 * n || cells.num_vertices() != geometry.num_voxels())
-    Refuse(name, std::to_string(geometry.num_voxels()) + " values for cells with " +
-                     std::to_string(cells.num_vertices()) + " vertices");
-  for (int64_t i = 0; i < 8 * n; ++i)
-    if (cells.corner[i] < 0 || cells.corner[i] >= cells.num_vertices())
-      Refuse(name, "cell " + std::to_string(i / 8) + " has vertex " +
-                       std::to_string(cells.corner[i]) + " of " +
-                       std::to_string(cells.num_vertices()));
-}
-
-void CheckSplats(const Geometry& geometry, const char* name) {
-  const SplatGeometry& splats = geometry.splats;
-  const int64_t n = splats.opacity_logit.size();
-  if (n > INT32_MAX) Refuse(name, Concat(n, " splats, at most ", INT32_MAX, " are supported"));
-  if (splats.mean.size() != 3 * n || splats.log_scale.size() != 3 * n ||
-      splats.quaternion.size() != 4 * n || geometry.density.size() > 0 ||
-      geometry.links.size() > 0 || geometry.cells.on() || geometry.spheres.on())
-    Refuse(name, "the sizes of the splats' arrays disagree");
-  const int64_t bad = CountNonFinite(splats.mean) + CountNonFinite(splats.log_scale) +
-                      CountNonFinite(splats.quaternion) + CountNonFinite(splats.opacity_logit);
-  if (bad > 0) Refuse(name, Concat(bad, " values of splats are not finite"));
 }
 
 // One pass: a link out of range would be an access out of bounds, and a voxel shared by two
@@ -112,19 +83,21 @@ void CheckSpheres(const Geometry& geometry, const Buffer<float>& color, const ch
 void Validate(const RadianceField& field, const char* name) {
   if (field.geometry == nullptr) Refuse(name, "the grid is missing");
   const Geometry& geometry = *field.geometry;
-  CheckFrame(geometry.frame, !geometry.splats.on(), name);
-  if (geometry.splats.on())
-    CheckSplats(geometry, name);
-  else if (geometry.cells.on())
-    CheckCells(geometry, name);
-  else if (geometry.links.size() != geometry.frame.NumVertices())
-    Refuse(name, std::to_string(geometry.links.size()) + " links for a grid of " +
-                     std::to_string(geometry.frame.NumVertices()) + " vertices");
+  const FieldKind& kind = KindOf(geometry);
+  CheckFrame(geometry.frame, kind.least_side, name);
+  if (const std::string defect = kind.defect_of(geometry); !defect.empty())
+    Refuse(name, defect);
+  const SplatGeometry& splats = geometry.splats;
+  const int64_t bad_splats = CountNonFinite(splats.mean) + CountNonFinite(splats.log_scale) +
+                             CountNonFinite(splats.quaternion) +
+                             CountNonFinite(splats.opacity_logit);
+  if (bad_splats > 0) Refuse(name, Concat(bad_splats, " values of splats are not finite"));
   const int basis = field.appearance.basis;
   if (!IsBasis(basis))
     Refuse(name, Concat(basis, " harmonics a channel; 1, 4, 9 or 16 are supported"));
-  if (!geometry.splats.on() && basis > kMaxVoxelBasis)
-    Refuse(name, Concat(basis, " harmonics a channel; of voxels 1, 4 or 9 are supported"));
+  if (basis > kind.most_basis)
+    Refuse(name,
+           Concat(basis, " harmonics a channel; of ", kind.name, " 1, 4 or 9 are supported"));
   const int64_t expected = geometry.num_voxels() * field.appearance.stride();
   if (field.appearance.sh.size() != expected)
     Refuse(name, std::to_string(field.appearance.sh.size()) + " colour coefficients, " +

@@ -51,9 +51,8 @@ struct Geometry {
   SphereGeometry spheres;
   SplatGeometry splats;
 
-  int64_t num_voxels() const {  // records
-    return splats.on() ? splats.opacity_logit.size() : density.size();
-  }
+  // Records: a field has one kind of them.
+  int64_t num_voxels() const { return density.size() + splats.opacity_logit.size(); }
 };
 
 struct Appearance {

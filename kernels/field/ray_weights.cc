@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "kernels/field/background_spheres.h"
+#include "kernels/field/field_kind.h"
 #include "kernels/field/render_cells.h"
 #include "kernels/field/trilinear.h"
 #include "kernels/field/volume_rendering.h"
@@ -85,30 +86,7 @@ float MarchDensity(const Geometry& geometry, const Ray& ray, const MarchOptions&
 }  // namespace
 
 void CornerPoints(const Geometry& geometry, const WeightedSample& sample, int32_t* point) {
-  if (geometry.splats.on()) {
-    std::fill_n(point, 8, -1);
-    point[0] = sample.vertex;
-    return;
-  }
-  if (!sample.on_sphere()) {
-    for (int k = 0; k < 8; ++k)
-      point[k] = geometry.cells.on()
-                     ? geometry.cells.corner[8 * int64_t{sample.vertex} + k]
-                     : geometry.links[CornerVertex(geometry.frame, sample.vertex, k)];
-    return;
-  }
-  const SphereGeometry& spheres = geometry.spheres;
-  const int r = spheres.resolution, texel = ~sample.vertex;
-  const int layer = texel % spheres.layers, at = texel / spheres.layers;
-  const int x = at / r, y = at % r;
-  for (int k = 0; k < 8; ++k) {
-    const int east = k & 4 ? (x + 1 < 2 * r ? x + 1 : 0) : x;
-    const int south = k & 2 ? std::min(y + 1, r - 1) : y;
-    const int32_t column = k & 1 ? -1 : spheres.links[int64_t{east} * r + south];
-    point[k] = column < 0 ? -1
-                          : static_cast<int32_t>(geometry.num_voxels()) +
-                                column * spheres.layers + layer;
-  }
+  KindOf(geometry).find_points(geometry, sample, point);
 }
 
 RayWeights ComputeRayWeights(const Geometry& geometry, View<const Ray> rays,

@@ -6,8 +6,7 @@
 
 #include "kernels/device/backend.h"
 #include "kernels/field/radiance_field.h"
-#include "kernels/render/splat_renderer.h"
-#include "kernels/render/voxel_renderer.h"
+#include "kernels/render/render_kind.h"
 #include "kernels/scene/camera.h"
 
 namespace regrade {
@@ -16,34 +15,33 @@ class FieldRenderer {
  public:
   // Copies what it needs. Throws Error(kResources) where the GPU's memory is too small.
   FieldRenderer(const RadianceField& field, Backend backend)
-      : kind_(field.geometry->splats.on() ? MakeSplatRenderer(field, backend)
-                                          : MakeVoxelRenderer(field, backend)) {}
+      : renderer_(RenderKindOf(*field.geometry).make_renderer(field, backend)) {}
 
   // Exact: single precision, every sample. A field of splats has no picture through a lens:
   // its cameras are pinholes.
-  RenderedView Render(const Camera& camera) const { return kind_->Render(camera); }
+  RenderedView Render(const Camera& camera) const { return renderer_->Render(camera); }
 
   // This field's view, and the colours of another one of the same geometry on the same
   // processor; exact. The CPU marches, or sorts splats, once for both.
   RenderedPair RenderWith(const FieldRenderer& other, const Camera& camera) const {
-    return kind_->RenderWith(*other.kind_, camera);
+    return renderer_->RenderWith(*other.renderer_, camera);
   }
 
   // Prepares the fast renderer: on a GPU a copy of a uniform field in half precision, or room
   // for the colours of an adaptive field's vertices. Returns why there is none, or an empty
   // text.
-  std::string PrepareFast() { return kind_->PrepareFast(); }
+  std::string PrepareFast() { return renderer_->PrepareFast(); }
   // Frees that memory.
-  void ForgetFast() { kind_->ForgetFast(); }
+  void ForgetFast() { renderer_->ForgetFast(); }
   // As RenderWith; both are prepared, and the camera has no distortion.
   RenderedPair RenderFastWith(const FieldRenderer& other, const Camera& camera) const {
-    return kind_->RenderFastWith(*other.kind_, camera);
+    return renderer_->RenderFastWith(*other.renderer_, camera);
   }
   // How RenderFastWith differs from RenderWith.
-  std::string FastText() const { return kind_->FastText(); }
+  std::string FastText() const { return renderer_->FastText(); }
 
  private:
-  std::unique_ptr<KindRenderer> kind_;
+  std::unique_ptr<KindRenderer> renderer_;
 };
 
 }  // namespace regrade

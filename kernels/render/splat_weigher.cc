@@ -42,6 +42,22 @@ struct PlaceBox {
   }
 };
 
+// Z over 1 - T of EQ(splat-composite).
+double SplatDepth(const SplatGeometry& splats, const Camera& camera, const RayWeights& weights,
+                  int64_t ray) {
+  const double seen = 1 - double{weights.transmittance[static_cast<size_t>(ray)]};
+  if (!(seen >= 0.5)) return 0;
+  double sum = 0;
+  for (int64_t i = weights.first[static_cast<size_t>(ray)];
+       i < weights.first[static_cast<size_t>(ray) + 1]; ++i) {
+    const WeightedSample& sample = weights.samples[static_cast<size_t>(i)];
+    const float* const mean = splats.mean.data() + 3 * int64_t{sample.vertex};
+    sum += double{sample.weight} *
+           (camera.camera_from_world * Vec3f{mean[0], mean[1], mean[2]}.Cast<double>()).z;
+  }
+  return sum / seen;
+}
+
 }  // namespace
 
 int64_t SplatWeigher::TileLists::bytes() const {
@@ -182,6 +198,22 @@ RayWeights SplatWeigher::Weigh(const ViewRays& rays, int64_t begin, int64_t end)
     }
   }
   return result;
+}
+
+std::unique_ptr<RayWeigher> MakeSplatWeigher(const Geometry& geometry, float near_clip,
+                                             const MarchOptions&, float min_weight,
+                                             int64_t kept_bytes) {
+  return std::make_unique<SplatWeigher>(geometry, near_clip, min_weight, kept_bytes);
+}
+
+std::vector<double> SplatDepths(const RadianceField& field, const ViewRays& rays,
+                                const MarchOptions&, RayWeigher* weigher) {
+  const RayWeights weights = weigher->Weigh(rays);
+  std::vector<double> depths(rays.rays.size());
+  for (int64_t r = 0; r < rays.size(); ++r)
+    depths[static_cast<size_t>(r)] =
+        SplatDepth(field.geometry->splats, rays.CameraOf(r), weights, r);
+  return depths;
 }
 
 }  // namespace regrade

@@ -49,4 +49,11 @@ class SplatWeigher : public RayWeigher {
   std::shared_ptr<const TileLists> last_;
 };
 
+// See MakeRayWeigher and RayDepths.
+std::unique_ptr<RayWeigher> MakeSplatWeigher(const Geometry& geometry, float near_clip,
+                                             const MarchOptions& march, float min_weight,
+                                             int64_t kept_bytes);
+std::vector<double> SplatDepths(const RadianceField& field, const ViewRays& rays,
+                                const MarchOptions& march, RayWeigher* weigher);
+
 }  // namespace regrade

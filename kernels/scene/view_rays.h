@@ -21,6 +21,9 @@ struct ViewRays {
   std::vector<ViewPlace> places;  // [rays]
 
   int64_t size() const { return std::ssize(rays); }
+  const Camera& CameraOf(int64_t ray) const {
+    return cameras[static_cast<size_t>(places[static_cast<size_t>(ray)].camera)];
+  }
   void Add(int32_t camera, double u, double v) {
     rays.push_back(cameras[static_cast<size_t>(camera)].FieldRay(u, v));
     places.push_back({camera, u, v});

@@ -146,7 +146,7 @@ void WritePackedCapture(const std::string& path, const PackedCapture& capture) {
   file.Add("pixels", {bytes}, pixels.data(), NpzPacking::kDeflate);
   file.Add("box", {7}, box_values);
   file.AddScalar<int32_t>("layers", box.layers);
-  if (box.spheres) file.AddScalar<int32_t>("spheres", 1);
+  if (box.far_surroundings) file.AddScalar<int32_t>("spheres", 1);
   if (box.background) file.Add("background", {3}, &box.background->x);
   file.Add("field_from_world", {13}, placement);
   file.Add("ndc", {2}, &capture.scene.ndc.a);
@@ -187,7 +187,8 @@ PackedCapture ReadPackedCapture(const std::string& path) {
   capture.scene.box.radius = {b[3], b[4], b[5]};
   capture.scene.box.near_clip = b[6];
   capture.scene.box.layers = file.ReadScalar<int32_t>("layers");
-  capture.scene.box.spheres = file.Has("spheres") && file.ReadScalar<int32_t>("spheres") != 0;
+  capture.scene.box.far_surroundings =
+      file.Has("spheres") && file.ReadScalar<int32_t>("spheres") != 0;
   capture.scene.box.voxel_aspect = VoxelAspect(capture.scene.ndc);
   if (file.Has("background")) {
     const NpzArray array = file.Read("background", ArrayType::kF32, {3});

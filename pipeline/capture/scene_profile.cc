@@ -121,7 +121,7 @@ bool ShowsThroughPhotos(const Capture& capture) {
 }
 
 SceneProfile ProfileScene(const Capture& capture, int sh_degree, const std::string& effects,
-                          const BoxOptions& box, bool splats) {
+                          const BoxOptions& box, const FieldKind& field) {
   const std::map<std::string, bool> overrides = ParseEffects(effects);
   const auto decided = [&overrides](const char* name, bool measured) {
     const auto override = overrides.find(name);
@@ -141,7 +141,7 @@ SceneProfile ProfileScene(const Capture& capture, int sh_degree, const std::stri
 
   const Capture sure = WithParallax(capture, kLeastParallaxDeg);
   const ForwardFacing forward = MeasureForwardFacing(sure);
-  const bool ndc = !splats && decided("ndc", forward.on && !alpha);
+  const bool ndc = field.lattice && decided("ndc", forward.on && !alpha);
   profile.effects.push_back(Row("ndc", ndc, forward.angle_deg, kForwardAngle,
                                 "forward-facing cameras: largest angle of an optical axis "
                                 "to their mean, degrees"));
@@ -157,18 +157,18 @@ SceneProfile ProfileScene(const Capture& capture, int sh_degree, const std::stri
         "--effects background=on", ndc ? "add ndc=off" : "add alpha=off");
   profile.effects.push_back(
       Row("background", background, surroundings.far_fraction, kFarFraction,
-          std::string(splats ? "far splats" : "spheres") +
+          std::string(field.far_records) +
               " around the box, for scenes with much far background: fraction of "
               "observations of points beyond four times the cameras' extent"));
   profile.effects.push_back(Row(kViewDependence, sh_degree > 0, sh_degree, 0,
                                 "degree of the fit's spherical harmonics, as set"));
 
   const bool cube = !ndc && box.camera_range > 0;
-  const bool surrounded = cube || (background && !splats);
+  const bool surrounded = cube || (background && field.lattice);
   profile.scene = ndc          ? NormalizeForwardFacing(sure, forward, box.margin)
                   : surrounded ? NormalizeSurrounded(sure, surroundings)
                                : NormalizeScene(sure);
-  profile.scene.box.spheres = background;
+  profile.scene.box.far_surroundings = background;
   if (alpha && !silhouettes.empty()) {
     if (!ndc && !cube) profile.scene = TightenToSilhouettes(profile.scene, silhouettes);
     profile.scene.box.background =

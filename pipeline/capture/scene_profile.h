@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "kernels/field/field_kind.h"
 #include "kernels/scene/capture.h"
 #include "pipeline/capture/effect_words.h"
 #include "pipeline/capture/photo_gains.h"
@@ -36,11 +37,13 @@ struct SceneProfile {
 // True if every photo has transparent parts, more than a soft edge has.
 bool ShowsThroughPhotos(const Capture& capture);
 
-// Independent of the photos' order (H154). Reads every photo, unless "exposure=off". `splats`
-// lie in the world as it is: they need no device coordinates, and their box holds far points,
-// too. Throws Error(kScene) for a requested effect that the capture does not allow.
+// Independent of the photos' order (H154). Reads every photo, unless "exposure=off". Records
+// that are on no lattice lie in the world as it is: they need no device coordinates, and their
+// box holds far points, too. Throws Error(kScene) for a requested effect that the capture does
+// not allow.
 SceneProfile ProfileScene(const Capture& capture, int sh_degree, const std::string& effects,
-                          const BoxOptions& box = {}, bool splats = false);
+                          const BoxOptions& box = {},
+                          const FieldKind& field = KindNamed("voxels"));
 
 // "distortion on: 12.3 > 0.5 (largest shift ...)"
 std::string EffectLine(const EffectReport& effect);

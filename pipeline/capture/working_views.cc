@@ -77,8 +77,12 @@ WorkingViews WorkingViews::Lenses() const {
 }
 
 WorkingViews WorkingViews::InField(const StoredField& stored) const {
-  const WorkingViews views = InField(stored.field_from_world, stored.ndc);
-  return stored.field.geometry->splats.on() ? views.Pinholes() : views;
+  return InField(stored.field_from_world, stored.ndc)
+      .CamerasFor(KindOf(*stored.field.geometry));
+}
+
+WorkingViews WorkingViews::CamerasFor(const FieldKind& kind) const {
+  return kind.lenses ? *this : Pinholes();
 }
 
 WorkingViews WorkingViews::WithGains(PhotoGains gains) const {

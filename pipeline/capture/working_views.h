@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "kernels/field/field_kind.h"
 #include "kernels/scene/capture.h"
 #include "pipeline/capture/photo_gains.h"
 #include "pipeline/fields/field_file.h"
@@ -30,10 +31,12 @@ class WorkingViews {
   WorkingViews(Capture capture, int photo_size, int holdout);
 
   WorkingViews InField(const Similarity& field_from_world, const NdcSpace& ndc) const;
-  // As `stored` needs its cameras: of splats they are pinholes.
+  // As `stored` needs its cameras, see CamerasFor.
   WorkingViews InField(const StoredField& stored) const;
   // Photos are undistorted, and what they do not show is masked.
   WorkingViews Pinholes() const;
+  // Pinholes, for a kind of field that has no picture through a lens.
+  WorkingViews CamerasFor(const FieldKind& kind) const;
   // The photos' own lenses.
   WorkingViews Lenses() const;
   WorkingViews WithGains(PhotoGains gains) const;

@@ -60,8 +60,7 @@ void RunPack(const Command& command, const Arguments& arguments, Console* consol
     if (!as_taken.Mask(i).empty())
       throw InputError("was posed with --photo-masks, which a packed capture cannot hold",
                        folder, "pose it again without them");
-  const SceneProfile profile =
-      ProfileScene(capture, 2, run.effects, scene.box, scene.UsesSplats());
+  const SceneProfile profile = ProfileScene(capture, 2, run.effects, scene.box, scene.Kind());
   for (const EffectReport& effect : profile.effects) console->Info(EffectLine(effect));
   for (const std::string& notice : profile.notices) console->Info(notice);
   PackedCapture packed;

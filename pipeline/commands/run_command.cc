@@ -12,34 +12,11 @@
 #include "pipeline/run/run_file.h"
 #include "pipeline/run_pipeline.h"
 #include "pipeline/stages/network_probe.h"
-#include "pipeline/stages/splat_views.h"
+#include "pipeline/stages/scene_source.h"
 #include "pipeline/workspace/stage_record.h"
 
 namespace regrade {
 namespace {
-
-// What belongs to a file of splats, which --field voxels cannot have.
-void ProbeSplats(RunContext* context) {
-  RunSettings& settings = context->settings;
-  std::string& cameras = settings.splat_input.cameras;
-  if (!context->FromSplats()) {
-    if (cameras.empty() && settings.splat_input.up == "auto") return;
-    throw UsageError("belongs to a file of splats", cameras.empty() ? "--up" : "--cameras",
-                     "leave it out, or give a file of splats in place of photos");
-  }
-  if (!settings.scene.UsesSplats())
-    throw UsageError("splats do not become voxels", context->source,
-                     "leave out --field voxels and --preset paper");
-  if (cameras.empty()) return;
-  if (settings.splat_input.up != "auto")
-    throw UsageError("the cameras know what is up", "--up and --cameras",
-                     "leave one of them out");
-  if (!std::filesystem::exists(cameras))
-    throw InputError("there is no such folder or file", cameras,
-                     "name a capture with cameras, or leave --cameras out");
-  cameras = AbsolutePath(cameras);
-  HasPhotosOfSplats(*context);
-}
 
 // Checks all inputs before long work starts.
 void ProbeInputs(const std::string& command, RunContext* context) {
@@ -48,9 +25,9 @@ void ProbeInputs(const std::string& command, RunContext* context) {
                      "name a folder of photos, a film or a file of splats");
   const std::filesystem::path out =
       std::filesystem::weakly_canonical(context->settings.run.out);
-  ProbeSplats(context);
-  const std::string& capture =
-      context->FromSplats() ? context->settings.splat_input.cameras : context->source;
+  const SceneSource& given = SourceOf(*context);
+  given.probe(context);
+  const std::string capture = given.capture(*context);
   const bool posed = !capture.empty() && DetectCapture(capture).kind == CaptureKind::kPosed;
   if (!posed && std::filesystem::weakly_canonical(context->source) == out)
     throw UsageError("is the folder of the photos", "--out",

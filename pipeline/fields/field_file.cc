@@ -1,6 +1,7 @@
 #include "pipeline/fields/field_file.h"
 
 #include <algorithm>
+#include <optional>
 #include <utility>
 #include <vector>
 
@@ -16,7 +17,7 @@ namespace {
 
 // The arrays of an adaptive field are unknown to readers of version 1, those of splats to
 // readers of version 2.
-constexpr int32_t kUniformVersion = 1, kCellsVersion = 2, kSplatsVersion = 3;
+constexpr int32_t kSplatsVersion = 3;
 // Colours have 9 columns a channel, as svox2 has them, or the 16 of splats of degree 3.
 constexpr int kLeastStored = 9;
 constexpr int64_t kSphericalHarmonics = 1;  // svox2's basis_type
@@ -83,19 +84,25 @@ void CheckReadable(NpzReader* file) {
   }
 }
 
+// Arrays that are made for the file, which WriteTo reads.
+struct MadeArrays {
+  std::vector<uint16_t> log_scale, quaternion, opacity_logit;
+  std::vector<float> texels;
+};
+
 // svox2's arrays: links [2R, R], and by column and layer red, green, blue, density.
-void AddSpheres(const RadianceField& field, std::vector<float>* texels, NpzWriter* file) {
+void AddSpheres(const RadianceField& field, MadeArrays* made, NpzWriter* file) {
   const SphereGeometry& spheres = field.geometry->spheres;
   if (!spheres.on()) return;
-  texels->resize(4 * spheres.num_texels());
+  made->texels.resize(4 * spheres.num_texels());
   for (int64_t i = 0; i < spheres.num_texels(); ++i) {
-    float* const texel = texels->data() + 4 * i;
+    float* const texel = made->texels.data() + 4 * i;
     std::copy_n(field.appearance.sphere_color.data() + 3 * i, 3, texel);
     texel[3] = spheres.density[i];
   }
   file->Add("background_links", {2 * spheres.resolution, spheres.resolution},
             spheres.links.data(), NpzPacking::kDeflate);
-  file->Add("background_data", {spheres.num_columns(), spheres.layers, 4}, texels->data());
+  file->Add("background_data", {spheres.num_columns(), spheres.layers, 4}, made->texels.data());
 }
 
 void ReadSpheres(NpzReader* file, SphereGeometry* spheres, Buffer<float>* color) {
@@ -124,9 +131,15 @@ void ReadSpheres(NpzReader* file, SphereGeometry* spheres, Buffer<float>* color)
   }
 }
 
+// How many rows the values of a geometry have, and why; uniform grids have those of the file.
+struct Rows {
+  std::optional<int64_t> count = {};
+  std::string reason = {};
+};
+
 // Keys and levels are checked before anything is derived of them: a key outside of the box
 // would be an entry outside of the tree.
-void ReadCells(NpzReader* file, Geometry* geometry) {
+Rows ReadCells(NpzReader* file, Geometry* geometry) {
   const NpzArray size = file->Read("regrade_cells_size", ArrayType::kI32, {3});
   const NpzArray keys = file->Read("regrade_cells_key", ArrayType::kU64, {-1});
   const int64_t n = keys.num_elements();
@@ -146,12 +159,17 @@ void ReadCells(NpzReader* file, Geometry* geometry) {
            "the file is damaged: make it again");
   FindVertices(&cells);
   BuildTree(geometry->frame.resolution, &cells);
+  return {cells.num_vertices(), Concat("the cells have ", cells.num_vertices(), " vertices")};
 }
 
-// The arrays of splats in half precision, which WriteTo reads.
-struct StoredSplats {
-  std::vector<uint16_t> log_scale, quaternion, opacity_logit;
-};
+void AddCells(const Geometry& geometry, MadeArrays*, NpzWriter* file) {
+  const CellGrid& cells = geometry.cells;
+  file->Add("regrade_cells_size", {3}, &geometry.frame.resolution.x);
+  file->AddScalar<int32_t>("regrade_cells_finest", cells.finest);
+  file->Add("regrade_cells_key", {cells.num_cells()}, cells.key.data(), NpzPacking::kDeflate);
+  file->Add("regrade_cells_level", {cells.num_cells()}, cells.level.data(),
+            NpzPacking::kDeflate);
+}
 
 std::vector<uint16_t> Halves(const Buffer<float>& values) {
   std::vector<uint16_t> halves(static_cast<size_t>(values.size()));
@@ -159,15 +177,16 @@ std::vector<uint16_t> Halves(const Buffer<float>& values) {
   return halves;
 }
 
-void AddSplats(const SplatGeometry& splats, StoredSplats* stored, NpzWriter* file) {
+void AddSplats(const Geometry& geometry, MadeArrays* made, NpzWriter* file) {
+  const SplatGeometry& splats = geometry.splats;
   const int64_t n = splats.opacity_logit.size();
-  stored->log_scale = Halves(splats.log_scale);
-  stored->quaternion = Halves(splats.quaternion);
-  stored->opacity_logit = Halves(splats.opacity_logit);
+  made->log_scale = Halves(splats.log_scale);
+  made->quaternion = Halves(splats.quaternion);
+  made->opacity_logit = Halves(splats.opacity_logit);
   file->Add("regrade_splats_mean", {n, 3}, splats.mean.data());
-  file->Add("regrade_splats_log_scale", {n, 3}, stored->log_scale.data());
-  file->Add("regrade_splats_quaternion", {n, 4}, stored->quaternion.data());
-  file->Add("regrade_splats_opacity_logit", {n}, stored->opacity_logit.data());
+  file->Add("regrade_splats_log_scale", {n, 3}, made->log_scale.data());
+  file->Add("regrade_splats_quaternion", {n, 4}, made->quaternion.data());
+  file->Add("regrade_splats_opacity_logit", {n}, made->opacity_logit.data());
   file->AddScalar<int32_t>("regrade_splats_antialiased", splats.antialiased);
 }
 
@@ -179,7 +198,8 @@ Buffer<float> ReadHalves(NpzReader* file, const std::string& name,
   return values;
 }
 
-void ReadSplats(NpzReader* file, SplatGeometry* splats) {
+Rows ReadSplats(NpzReader* file, Geometry* geometry) {
+  SplatGeometry* const splats = &geometry->splats;
   const NpzArray mean = file->Read("regrade_splats_mean", ArrayType::kF32, {-1, 3});
   const int64_t n = mean.shape[0];
   if (n == 0) Refuse(file->path(), "there are no splats");
@@ -189,41 +209,59 @@ void ReadSplats(NpzReader* file, SplatGeometry* splats) {
   splats->quaternion = ReadHalves(file, "regrade_splats_quaternion", {n, 4});
   splats->opacity_logit = ReadHalves(file, "regrade_splats_opacity_logit", {n});
   splats->antialiased = file->ReadScalar<int32_t>("regrade_splats_antialiased") != 0;
+  return {n, Concat("there are ", n, " splats")};
 }
 
-Geometry ReadGeometry(NpzReader* file) {
-  Geometry geometry;
-  geometry.frame.radius = ReadVec3(file, "radius");
-  geometry.frame.center = ReadVec3(file, "center");
-  if (file->Has("regrade_splats_mean")) {
-    if (file->Has("links") || file->Has("regrade_cells_key"))
-      Refuse(file->path(), "a field has voxels or splats, not both");
-    ReadSplats(file, &geometry.splats);
-    return geometry;
-  }
-  if (file->Has("regrade_cells_key")) {
-    if (file->Has("links"))
-      Refuse(file->path() + ": array 'links'", "a field has links or cells, not both");
-    ReadCells(file, &geometry);
-    return geometry;
-  }
+Rows ReadLinks(NpzReader* file, Geometry* geometry) {
   const NpzArray links = file->Read("links", ArrayType::kI32, {-1, -1, -1});
   for (int a = 0; a < 3; ++a) {
     if (links.shape[a] > 4096)
       Refuse(file->path(), "a grid of " + links.ShapeText() + " vertices",
              "at most 4096 along an axis are read");
-    geometry.frame.resolution[a] = static_cast<int>(links.shape[a]);
+    geometry->frame.resolution[a] = static_cast<int>(links.shape[a]);
   }
-  if (geometry.frame.NumVertices() > INT32_MAX)
+  if (geometry->frame.NumVertices() > INT32_MAX)
     Refuse(file->path(), "a grid of " + links.ShapeText() + " vertices is too large");
-  geometry.links.Resize(links.num_elements());
+  geometry->links.Resize(links.num_elements());
   // svox2 keeps distances to the next voxel below -1.
   for (int64_t i = 0; i < links.num_elements(); ++i)
-    geometry.links[i] = std::max(links.As<int32_t>()[i], -1);
-  return geometry;
+    geometry->links[i] = std::max(links.As<int32_t>()[i], -1);
+  return {};
 }
 
-void ReadValues(NpzReader* file, Geometry* geometry, Appearance* appearance) {
+void AddLinks(const Geometry& geometry, MadeArrays*, NpzWriter* file) {
+  const Vec3i& n = geometry.frame.resolution;
+  file->Add("links", {n.x, n.y, n.z}, geometry.links.data(), NpzPacking::kDeflate);
+}
+
+// How a file holds a geometry.
+struct Layout {
+  int32_t version;
+  bool densities;
+  Rows (*read)(NpzReader* file, Geometry* geometry);
+  void (*add)(const Geometry& geometry, MadeArrays* made, NpzWriter* file);
+};
+constexpr Layout kUniform{1, true, ReadLinks, AddLinks},
+    kAdaptive{2, true, ReadCells, AddCells},
+    kSplats{kSplatsVersion, false, ReadSplats, AddSplats};
+
+const Layout& LayoutOf(const Geometry& geometry) {
+  return geometry.splats.on() ? kSplats : geometry.cells.on() ? kAdaptive : kUniform;
+}
+
+const Layout& LayoutOf(NpzReader* file) {
+  const bool links = file->Has("links"), cells = file->Has("regrade_cells_key");
+  if (file->Has("regrade_splats_mean")) {
+    if (links || cells) Refuse(file->path(), "a field has voxels or splats, not both");
+    return kSplats;
+  }
+  if (cells && links)
+    Refuse(file->path() + ": array 'links'", "a field has links or cells, not both");
+  return cells ? kAdaptive : kUniform;
+}
+
+void ReadValues(NpzReader* file, const Layout& layout, const Rows& rows, Geometry* geometry,
+                Appearance* appearance) {
   const bool joined = file->Has("data");  // old checkpoints: [density, colours] by row
   const NpzArray colours = file->Read(joined ? "data" : "sh_data");
   const int64_t first = joined ? 1 : 0;
@@ -233,13 +271,9 @@ void ReadValues(NpzReader* file, Geometry* geometry, Appearance* appearance) {
       !IsBasis(static_cast<int>(colours.shape[1] - first) / 3))
     Refuse(file->path(), std::string("colours are ") + NameOf(colours.type) +
                              colours.ShapeText() + "; 3, 12, 27 or 48 columns are read");
-  if (geometry->cells.on() && colours.shape[0] != geometry->cells.num_vertices())
+  if (rows.count && colours.shape[0] != *rows.count)
     Refuse(file->path() + ": array '" + (joined ? "data" : "sh_data") + "'",
-           std::to_string(colours.shape[0]) + " rows, but the cells have " +
-               std::to_string(geometry->cells.num_vertices()) + " vertices");
-  if (geometry->splats.on() && colours.shape[0] != geometry->num_voxels())
-    Refuse(file->path() + ": array 'sh_data'", Concat(colours.shape[0], " rows, but there are ",
-                                                      geometry->num_voxels(), " splats"));
+           Concat(colours.shape[0], " rows, but ", rows.reason));
   const int stored = static_cast<int>((colours.shape[1] - first) / 3);
   appearance->basis =
       file->Has("regrade_basis") ? file->ReadScalar<int32_t>("regrade_basis") : stored;
@@ -248,7 +282,7 @@ void ReadValues(NpzReader* file, Geometry* geometry, Appearance* appearance) {
     Refuse(file->path(),
            Concat("regrade_basis is ", basis, " of ", stored, " stored harmonics"));
   appearance->sh = UnpackedColours(colours, first, stored, basis);
-  if (geometry->splats.on()) return;
+  if (!layout.densities) return;
   geometry->density.Resize(colours.shape[0]);
   if (joined) {
     for (int64_t i = 0; i < colours.shape[0]; ++i)
@@ -265,7 +299,6 @@ void WriteFieldFile(const std::string& path, const StoredField& stored) {
   const RadianceField& field = stored.field;
   const Geometry& geometry = *field.geometry;
   const int64_t voxels = geometry.num_voxels();
-  const Vec3i size = geometry.frame.resolution;
   const Similarity& similarity = stored.field_from_world;
   double placement[13] = {similarity.scale};
   for (int i = 0; i < 3; ++i) {
@@ -276,20 +309,10 @@ void WriteFieldFile(const std::string& path, const StoredField& stored) {
   NpzWriter file;
   file.Add("radius", {3}, &geometry.frame.radius.x);
   file.Add("center", {3}, &geometry.frame.center.x);
-  const CellGrid& cells = geometry.cells;
-  StoredSplats splats;  // read by the writer in WriteTo
-  if (geometry.splats.on()) {
-    AddSplats(geometry.splats, &splats, &file);
-  } else if (cells.on()) {
-    file.Add("regrade_cells_size", {3}, &size.x);
-    file.AddScalar<int32_t>("regrade_cells_finest", cells.finest);
-    file.Add("regrade_cells_key", {cells.num_cells()}, cells.key.data(), NpzPacking::kDeflate);
-    file.Add("regrade_cells_level", {cells.num_cells()}, cells.level.data(),
-             NpzPacking::kDeflate);
-  } else {
-    file.Add("links", {size.x, size.y, size.z}, geometry.links.data(), NpzPacking::kDeflate);
-  }
-  if (!geometry.splats.on()) file.Add("density_data", {voxels, 1}, geometry.density.data());
+  const Layout& layout = LayoutOf(geometry);
+  MadeArrays made;  // read by the writer in WriteTo
+  layout.add(geometry, &made, &file);
+  if (layout.densities) file.Add("density_data", {voxels, 1}, geometry.density.data());
   file.AddFilled<uint16_t>(
       "sh_data", {voxels, 3 * StoredBasis(field.appearance)},
       [&field](int64_t first, int64_t count, uint16_t* to) {
@@ -297,17 +320,14 @@ void WriteFieldFile(const std::string& path, const StoredField& stored) {
       },
       field.appearance.basis >= kLeastStored ? NpzPacking::kStore : NpzPacking::kDeflate);
   file.AddScalar<int64_t>("basis_type", kSphericalHarmonics);
-  file.AddScalar<int32_t>("regrade_version", geometry.splats.on() ? kSplatsVersion
-                                             : cells.on()         ? kCellsVersion
-                                                                  : kUniformVersion);
+  file.AddScalar<int32_t>("regrade_version", layout.version);
   file.AddScalar<int32_t>("regrade_basis", field.appearance.basis);
   file.Add("regrade_background", {3}, &field.background.x);
   file.AddScalar<float>("regrade_near_clip", field.near_clip);
   file.AddScalar<float>("regrade_step", field.step);
   file.Add("regrade_field_from_world", {13}, placement);
   if (stored.ndc.on()) file.Add("regrade_ndc", {2}, &stored.ndc.a);
-  std::vector<float> texels;  // read by the writer in WriteTo
-  AddSpheres(field, &texels, &file);
+  AddSpheres(field, &made, &file);
   file.WriteTo(path);
 }
 
@@ -322,8 +342,12 @@ StoredField ReadFieldFile(const std::string& path, uint64_t budget) {
   NpzReader file(path, budget);
   CheckReadable(&file);
   StoredField stored;
-  Geometry geometry = ReadGeometry(&file);
-  ReadValues(&file, &geometry, &stored.field.appearance);
+  Geometry geometry;
+  geometry.frame.radius = ReadVec3(&file, "radius");
+  geometry.frame.center = ReadVec3(&file, "center");
+  const Layout& layout = LayoutOf(&file);
+  const Rows rows = layout.read(&file, &geometry);
+  ReadValues(&file, layout, rows, &geometry, &stored.field.appearance);
   ReadSpheres(&file, &geometry.spheres, &stored.field.appearance.sphere_color);
   stored.field.geometry = std::make_shared<const Geometry>(std::move(geometry));
   stored.field.background =

@@ -20,16 +20,9 @@ struct PathClearance {
 // A path with a lower transmittance passes through surfaces: haze of a fit leaves 0.8 and more.
 inline constexpr double kClearTransmittance = 0.5;
 
-// All cameras in the field's frame, which is not that of device coordinates (NdcSpace). Density
-// is sampled at half voxels along the path. EQ(splat-clearance): a splat adds
-//   -ln(1 - o exp(-q / 2)) (Phi(b) - Phi(a))
-// to the optical depth of a segment, q the least squared Mahalanobis distance from its mean to
-// the segment's line, a and b the ends' distances from there along the line, likewise, and Phi
-// the normal distribution: as much as it hides when it is looked at along the line.
+// All cameras in the field's frame, which is not that of device coordinates (NdcSpace). Optical
+// depths along the path are those of optical_depth.h.
 PathClearance MeasureClearance(const RadianceField& field, const std::vector<Camera>& photos,
                                const std::vector<Camera>& path);
-
-// Optical depth of each of `path`'s segments, [path.size() - 1], see EQ(splat-clearance).
-std::vector<double> SplatDepthAlong(const RadianceField& field, const std::vector<Vec3d>& path);
 
 }  // namespace regrade

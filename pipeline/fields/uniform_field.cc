@@ -7,7 +7,7 @@
 #include <utility>
 
 #include "kernels/base/error.h"
-#include "pipeline/fields/field_sampler.h"
+#include "kernels/field/field_sampler.h"
 
 namespace regrade {
 namespace {

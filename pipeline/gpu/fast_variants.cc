@@ -11,6 +11,7 @@
 #include "evaluate/image_quality.h"
 #include "kernels/field/cuda/device_rays.h"
 #include "kernels/render/field_renderer.h"
+#include "kernels/render/voxel_renderer.h"
 #include "pipeline/fields/camera_path.h"
 #include "pipeline/fields/film_timing.h"
 #include "pipeline/gpu/gpu_commands.h"

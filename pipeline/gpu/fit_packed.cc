@@ -64,8 +64,9 @@ HeldOut MeasureHeldOut(FitEngine* engine, const PackedCapture& capture,
 std::string ChoosePaper(const FitPackedOptions& settings, const PackedCapture& capture,
                         OptionSet* bound) {
   const SceneBox& box = capture.scene.box;
-  const bool llff = capture.scene.ndc.on(), syn = !llff && !box.spheres && box.background;
-  if (!llff && !syn && !box.spheres)
+  const bool llff = capture.scene.ndc.on(),
+             syn = !llff && !box.far_surroundings && box.background;
+  if (!llff && !syn && !box.far_surroundings)
     throw UsageError("was packed without --preset paper", settings.capture,
                      "pack it with --preset paper and the same --paper-config");
   const PaperChoice choice = ChoosePaperConfig(settings.paper_config, {syn, llff});

@@ -9,6 +9,7 @@
 
 #include "kernels/base/error.h"
 #include "kernels/field/cuda/device_rays.h"
+#include "kernels/field/field_kind.h"
 #include "kernels/field/packed_grid.h"
 #include "pipeline/fields/field_file.h"
 #include "pipeline/gpu/gpu_commands.h"
@@ -25,7 +26,7 @@ void WritePpm(const std::string& path, const Image& image) {
 
 PackedCapture ReadCaptureFor(const RadianceField& field, const std::string& path) {
   PackedCapture capture = ReadPackedCapture(path);
-  if (field.geometry->splats.on())
+  if (!KindOf(*field.geometry).lenses)
     for (PackedView& view : capture.views) view = PinholeView(std::move(view));
   return capture;
 }
@@ -45,10 +46,10 @@ void RenderPacked(const RenderPackedOptions& settings) {
   const PackedCapture capture = ReadCaptureFor(field, settings.capture);
   if (!settings.frames.empty() && !settings.compare)
     RenderHeldOut(FieldRenderer(field, Backend::kCuda), capture, settings.frames, "frame");
-  JsonValue record = JsonValue::Object{
-      {"capture", settings.capture},
-      {"device", ReadDeviceStatus().name},
-      {field.geometry->splats.on() ? "splats" : "voxels", field.geometry->num_voxels()}};
+  JsonValue record =
+      JsonValue::Object{{"capture", settings.capture},
+                        {"device", ReadDeviceStatus().name},
+                        {KindOf(*field.geometry).name, field.geometry->num_voxels()}};
   if (settings.compare)
     record["compare"] =
         CompareRenderers(UploadGrid(MakeFastGrid(field)), capture, field.step, settings);

@@ -12,6 +12,7 @@
 #include "kernels/base/clock.h"
 #include "kernels/base/error.h"
 #include "kernels/device/device_memory.h"
+#include "kernels/field/field_kind.h"
 #include "kernels/image/undistort_photo.h"
 #include "kernels/render/field_renderer.h"
 #include "pipeline/fields/field_file.h"
@@ -172,7 +173,7 @@ void StylePacked(const StylePackedOptions& settings, const TrainNetworkOptions& 
   record["seconds_other_steps"] = seconds_steps;
   if (on_device) MeasureFrames(restyled.styled, capture, unstyled, settings.frames, &record);
   record["device"] = on_device ? ReadDeviceStatus().name : "cpu";
-  record[restyled.styled.geometry->splats.on() ? "splats" : "voxels"] = voxels;
+  record[KindOf(*restyled.styled.geometry).name] = voxels;
   record["steps"] = trained.steps;
   record["mean_touched_voxels"] = trained.mean_touched_voxels;
   record["mib_beyond_the_field"] = static_cast<double>(free_before - least_free) / (1 << 20);

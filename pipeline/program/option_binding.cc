@@ -159,7 +159,9 @@ void OptionSet::ApplyConfig(const JsonValue& values, const std::string& where) {
   for (const auto& [name, value] : values.AsObject()) {
     const Entry* entry = Find(name);
     if (entry == nullptr) {
-      const std::string nearest = NearestName(name, Names());
+      Words all = {};
+      for (const Entry& known : entries_) all.push_back(known.name);
+      const std::string nearest = NearestName(name, all);
       throw UsageError("unknown option \"" + name + "\"", place(value),
                        nearest.empty() ? "see --help" : "did you mean \"" + nearest + "\"?");
     }

@@ -69,8 +69,8 @@ struct RunOptions {
     bind("reproducible", reproducible,
          {.help = "gives the same bytes for any number of threads and any interruption, from "
                   "finished poses on; slower. --device auto then means the CPU; with --device "
-                  "cuda fit-exact-sums and style-exact-sums are on, and the bytes are those "
-                  "of this card and build"});
+                  "cuda style-exact-sums is on, of voxels fit-exact-sums, too, and the bytes "
+                  "are those of this card and build"});
   }
 };
 
@@ -94,9 +94,8 @@ struct StartOptions {
   template <typename Bind>
   void Describe(Bind& bind) {
     bind("config", config,
-         {.help = "a run.json to take options and arguments from; or constants of the program, "
-                  "which --help-constants lists, as {\"NAME\": VALUE, ...} in a file or here. "
-                  "Flags override them",
+         {.help = "a run.json to take options and arguments from, or {\"NAME\": VALUE, ...} of "
+                  "--help-constants, in a file or here. Flags override them",
           .once = true});
     bind("restart-from", restart_from,
          {.help = "repeats this stage and all later ones, even where they are done",

@@ -1,8 +1,8 @@
 #include "pipeline/run/equivalent_command.h"
 
 #include "pipeline/program/device_choice.h"
+#include "pipeline/run/fit_kind.h"
 #include "pipeline/run/presets.h"
-#include "pipeline/run/resolve_settings.h"
 
 namespace regrade {
 namespace {
@@ -45,12 +45,16 @@ std::vector<std::string> EquivalentCommand(const RunContext& context) {
   if (!context.source.empty()) words.push_back(context.source);
   if (preset != RunSettings().run.preset) words.insert(words.end(), {"--preset", preset});
   const JsonValue values = context.options.Values();
-  // The flags of another kind of field are refused.
-  const JsonValue unused = OptionsOfOtherFit(context.settings.scene.field);
+  JsonValue refused = JsonValue::Object();  // flags of another kind of field
+  for (const FitKind* kind : FitKinds()) {
+    if (kind == &FitKindOf(context.settings)) continue;
+    const JsonValue flags = kind->options({});
+    for (const auto& [name, value] : flags.AsObject()) refused[name] = value;
+  }
   JsonValue constants = JsonValue::Object();
   for (const auto& [name, value] : values.AsObject()) {
     if (name == "preset" || start.Find(name) != nullptr || program.Find(name) != nullptr ||
-        unused.Find(name) != nullptr)
+        refused.Find(name) != nullptr)
       continue;
     if (before.At(name) == value) continue;
     if (context.options.IsConstant(name))

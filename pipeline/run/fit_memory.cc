@@ -33,6 +33,8 @@ const char* MemoryOf(const FitPlace& place) {
   return place.backend == Backend::kCuda ? "GPU memory" : "memory";
 }
 
+}  // namespace
+
 StagePlan PlanSplatsAt(const FitPlace& place, const SplatFitOptions& options) {
   return place.backend == Backend::kCuda
              ? PlanSplatFitOnDevice(options, place.pixels, place.photos)
@@ -45,8 +47,6 @@ SplatFitOptions AtMostOfPixels(SplatFitOptions options, const FitPlace& place) {
       std::clamp(most, std::min(kLeastSplats, options.thousands), options.thousands);
   return options;
 }
-
-}  // namespace
 
 StagePlan PlanFitAt(const FitPlace& place, const FitOptions& options) {
   return place.backend == Backend::kCuda
@@ -84,23 +84,6 @@ PlannedSplatFit SplatsWithinMemory(SplatFitOptions options, const FitPlace& plac
   fit.plan = plan_of(fit.options);
   CheckFitsMemory(fit.plan, LimitOf(place), MemoryOf(place));
   return fit;
-}
-
-StagePlan PlanFieldFit(const RunSettings& settings, const FitPlace& place) {
-  return settings.scene.UsesSplats()
-             ? PlanSplatsAt(place, AtMostOfPixels(settings.splats, place))
-             : PlanFitAt(place, AdaptedTo(settings.fit, place));
-}
-
-std::string MemoryWarning(const RunSettings& settings, const FitPlace& place) {
-  try {
-    return settings.scene.UsesSplats()
-               ? SplatsWithinMemory(settings.splats, place).notice
-               : FitWithinMemory(AdaptedTo(settings.fit, place), place).notice;
-  } catch (const Error& error) {
-    if (error.code() != ExitCode::kResources) throw;
-    return error.what_failed() + (error.hint().empty() ? "" : ": " + error.hint());
-  }
 }
 
 }  // namespace regrade

@@ -1,5 +1,5 @@
-// What a fit of either kind of field takes of the processor that it runs on, and what it is
-// lowered to where that is too much: one rule for `regrade run` and `regrade_gpu fit`.
+// What a fit of voxels or splats takes of the processor that it runs on, and what it is lowered
+// to where that is too much: one rule for `regrade run` and `regrade_gpu fit`.
 #pragma once
 
 #include <cstdint>
@@ -7,7 +7,9 @@
 
 #include "kernels/device/backend.h"
 #include "pipeline/run/plan.h"
-#include "pipeline/run/run_settings.h"
+#include "reconstruct/fit/fit_options.h"
+#include "reconstruct/scene/scene_box.h"
+#include "reconstruct/splats/splat_fit_options.h"
 
 namespace regrade {
 
@@ -22,6 +24,7 @@ struct FitPlace {
 };
 
 StagePlan PlanFitAt(const FitPlace& place, const FitOptions& options);
+StagePlan PlanSplatsAt(const FitPlace& place, const SplatFitOptions& options);
 
 struct PlannedFit {
   FitOptions options;
@@ -39,19 +42,14 @@ struct PlannedSplatFit {
   std::string notice;
 };
 
-// The same of splats: first at most one for each kPixelsOfSplat pixels of the photos; with
-// more, few photos are explained one by one, and views between them get worse.
+// At most one splat for each kPixelsOfSplat pixels of the photos; with more, few photos are
+// explained one by one, and views between them get worse.
 inline constexpr int kPixelsOfSplat = 15;
+SplatFitOptions AtMostOfPixels(SplatFitOptions options, const FitPlace& place);
+// As FitWithinMemory, and first AtMostOfPixels.
 PlannedSplatFit SplatsWithinMemory(SplatFitOptions options, const FitPlace& place);
-
-// The plan of the field that the settings ask for, whatever its kind, before it is lowered.
-StagePlan PlanFieldFit(const RunSettings& settings, const FitPlace& place);
 
 // AdaptOptions for the place.
 FitOptions AdaptedTo(const FitOptions& options, const FitPlace& place);
-
-// What a person should know of the fit's memory before it begins: that less than it takes is
-// free, and what it is lowered to; or nothing.
-std::string MemoryWarning(const RunSettings& settings, const FitPlace& place);
 
 }  // namespace regrade

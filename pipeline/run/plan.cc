@@ -70,7 +70,7 @@ StagePlan PlanFit(const FitOptions& options, int64_t photo_pixels, const SceneBo
     const double rays = static_cast<double>(options.steps[s]) * options.rays_per_step;
     seconds += rays / kRaysPerSecond * options.resolutions[s] / kRateResolution;
   }
-  if (box.spheres) {
+  if (box.far_surroundings) {
     // Values, moments, gradients and a resampled copy, 16 bytes each; a slot in each arena.
     // Time is about the same: the ball has fewer voxels than the box.
     const double map = 2.0 * options.background_resolution * options.background_resolution;
@@ -112,7 +112,7 @@ StagePlan PlanFitOnDevice(const FitOptions& options, int64_t photo_pixels,
     seconds += static_cast<double>(options.steps[s]) * options.rays_per_step * kSamplesPerRay /
                kDeviceSamplesPerSecond;
   }
-  if (box.spheres) {  // values, gradients and moments
+  if (box.far_surroundings) {  // values, gradients and moments
     const double map = 2.0 * options.background_resolution * options.background_resolution;
     peak += map * (kIndexBytes + kSphereFraction * options.background_layers *
                                      (options.exact_sums ? 4 : 3) * 16);

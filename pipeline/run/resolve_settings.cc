@@ -5,6 +5,7 @@
 
 #include "kernels/base/error.h"
 #include "pipeline/program/device_choice.h"
+#include "pipeline/run/fit_kind.h"
 #include "pipeline/run/paper_config.h"
 #include "pipeline/run/presets.h"
 #include "pipeline/run/run_file.h"
@@ -85,12 +86,14 @@ void RefuseFlagsOfOtherField(const OptionSet& options, const ConfigFile& config)
   const JsonValue* const field = values.Find("field");
   if (field == nullptr || values.Find("photo-size") == nullptr) return;
   const std::string& own = field->AsString();
-  const JsonValue others = OptionsOfOtherFit(own);
-  for (const auto& [name, value] : others.AsObject())
-    if (options.Given(name) || (!config.is_run && config.run.options.Find(name) != nullptr))
-      throw UsageError(
-          "this run fits " + own, options.IsConstant(name) ? name : "--" + name,
-          Concat("leave it out, or add --field ", own == "splats" ? "voxels" : "splats"));
+  for (const FitKind* other : FitKinds()) {
+    if (own == other->name) continue;
+    const JsonValue flags = other->options({});
+    for (const auto& [name, value] : flags.AsObject())
+      if (options.Given(name) || (!config.is_run && config.run.options.Find(name) != nullptr))
+        throw UsageError("this run fits " + own, options.IsConstant(name) ? name : "--" + name,
+                         Concat("leave it out, or add --field ", other->name));
+  }
 }
 
 // What the flags say, or else the defaults; false for a command without --device.
@@ -152,10 +155,6 @@ void ApplyRunFile(const RunFile& file, const std::string& path,
 }
 
 }  // namespace
-
-JsonValue OptionsOfOtherFit(const std::string& field) {
-  return field == "splats" ? OptionValues(FitOptions()) : OptionValues(SplatFitOptions());
-}
 
 std::vector<std::string> ResolveSettings(const SettingsSources& sources, OptionSet* options) {
   std::vector<std::string> words;

@@ -36,8 +36,4 @@ struct SettingsSources {
 // `sources.run_json`, or else of --config. Throws Error(kUsage).
 std::vector<std::string> ResolveSettings(const SettingsSources& sources, OptionSet* options);
 
-// The options, with their defaults, of a fit of the other kind of field than `field`, which is
-// "splats" or "voxels".
-JsonValue OptionsOfOtherFit(const std::string& field);
-
 }  // namespace regrade

@@ -11,7 +11,6 @@
 #include "pipeline/program/console.h"
 #include "pipeline/run/run_settings.h"
 #include "pipeline/run/stage_estimate.h"
-#include "pipeline/splat_files/read_splats.h"
 #include "pipeline/workspace/stage_runner.h"
 #include "pipeline/workspace/workspace.h"
 
@@ -36,20 +35,19 @@ struct RunContext {
   std::optional<CaptureSize> source_size = {};  // of the photos, once somebody asked for it
   std::vector<PlannedStage> planned = {};       // in a dry run
 
-  // Whether `source` is a file of splats, which is read in place of a fit.
-  bool FromSplats() const { return IsSplatFile(source); }
   // What `source` is, or the capture that gives a file of splats its cameras. Folders of masks
   // in it hold no photos.
   CaptureSource Source() const {
-    return DetectCapture(FromSplats() ? settings.splat_input.cameras : source,
+    const std::string& cameras = settings.splat_input.cameras;
+    return DetectCapture(cameras.empty() ? source : cameras,
                          {settings.pose.photo_masks, settings.object.masks});
   }
   // Of the finished stage "pose", with the gains of "reconstruct"; cameras in the capture's
   // world.
   WorkingViews Views() const {
-    const WorkingViews views = ReadWorkingViews(
-        workspace->Path("poses"), settings.scene.photo_size, settings.run.holdout);
-    return settings.scene.UsesSplats() ? views.Pinholes() : views;
+    return ReadWorkingViews(workspace->Path("poses"), settings.scene.photo_size,
+                            settings.run.holdout)
+        .CamerasFor(settings.scene.Kind());
   }
   // Where a stage has its record and its results. A style must be chosen for a stage of one.
   Workspace& FolderOf(const std::string& stage) const {

@@ -4,8 +4,8 @@
 #include <iterator>
 
 #include "kernels/base/error.h"
-#include "pipeline/capture/effect_words.h"
 #include "pipeline/images/cube_file.h"
+#include "pipeline/run/fit_kind.h"
 #include "pipeline/run/paper_config.h"
 #include "pipeline/run/vignette.h"
 #include "pipeline/workspace/output_names.h"
@@ -34,8 +34,10 @@ void RunSettings::Bind(OptionSet* options) {
 }
 
 JsonValue OptionsOfFit(const RunSettings& settings) {
-  return settings.scene.UsesSplats() ? OptionValues(settings.scene, settings.splats)
-                                     : OptionValues(settings.scene, settings.fit);
+  JsonValue values = OptionValues(settings.scene);
+  const JsonValue of_kind = FitKindOf(settings).options(settings);
+  for (const auto& [name, value] : of_kind.AsObject()) values[name] = value;
+  return values;
 }
 
 namespace {
@@ -99,19 +101,6 @@ void CheckRequirements(const RunSettings& settings) {
   }
 }
 
-// What belongs to voxels alone.
-void CheckSplats(const RunSettings& settings) {
-  if (!settings.scene.UsesSplats()) return;
-  if (settings.run.preset == "paper")
-    throw UsageError("the paper's field has voxels", "--field splats and --preset paper",
-                     "leave one of them out");
-  const auto effects = ParseEffects(settings.run.effects);
-  for (const char* name : {"ndc", "background"})
-    if (const auto effect = effects.find(name); effect != effects.end() && effect->second)
-      throw UsageError("belongs to voxels", Concat("--effects ", name, "=on"),
-                       "leave it out, or use --field voxels");
-}
-
 }  // namespace
 
 bool MeasuresFilm(const RunSettings& settings) {
@@ -133,7 +122,7 @@ void CheckTogether(const RunSettings& settings) {
           Concat("belongs to a uniform field, with a side for each of ", grids, " stages"),
           flag, "leave it out, or give --fit-field uniform and the sides");
   CheckPaper(settings.run.preset, settings.run.paper_config, settings.fit.field);
-  CheckSplats(settings);
+  FitKindOf(settings).check(settings);
   const StyleMethod method = ParseStyleMethod(settings.style_2d);
   CheckResidual(settings, method.kind);
   CheckMatch(settings);

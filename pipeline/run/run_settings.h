@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "evaluate/consistency.h"
+#include "kernels/field/field_kind.h"
 #include "pipeline/capture/ingest_photos.h"
 #include "pipeline/capture/object_masks.h"
 #include "pipeline/fields/camera_path.h"
@@ -41,7 +42,7 @@ struct SceneOptions {
           .choices = "voxels|splats"});
     box.Describe(bind);
   }
-  bool UsesSplats() const { return field == "splats"; }
+  const FieldKind& Kind() const { return KindNamed(field); }
 };
 
 // What the program needs to know of a file of splats that is given in place of photos.
@@ -181,8 +182,6 @@ struct RunSettings {
 
   // Under the headings of the help.
   void Bind(OptionSet* options);
-
-  int sh_degree() const { return scene.UsesSplats() ? splats.sh_degree : fit.sh_degree; }
 };
 
 // The options that a field of the settings' kind depends on.

@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "pipeline/fields/film_timing.h"
-#include "pipeline/run/fit_memory.h"
+#include "pipeline/run/fit_kind.h"
 #include "pipeline/run/plan.h"
 
 namespace regrade {
@@ -35,8 +35,8 @@ double PoseSeconds(const CaptureSize& size, int threads) {
 }
 
 StagePlan FitPlan(const RunSettings& settings, const CaptureSize& size, Backend backend) {
-  return PlanFieldFit(settings,
-                      {backend, PixelsToFit(settings, size), PhotosToFit(settings, size)});
+  return FitKindOf(settings).plan(
+      settings, {backend, PixelsToFit(settings, size), PhotosToFit(settings, size)});
 }
 
 double RenderSeconds(const RunSettings& settings, const CaptureSize& size) {

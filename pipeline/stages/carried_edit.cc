@@ -18,7 +18,7 @@ namespace {
 // a silhouette the layer is of either side.
 constexpr double kDepthTolerance = 0.03;
 
-bool SameView(const Camera& a, const Camera& b) {
+bool SameViewpoint(const Camera& a, const Camera& b) {
   const auto same = [](const Vec3d& x, const Vec3d& y) { return Dot(x - y, x - y) == 0; };
   return a.SameIntrinsics(b) && same(a.Center(), b.Center()) &&
          same(a.Forward(), b.Forward()) && same(a.Up(), b.Up());
@@ -158,7 +158,7 @@ Image CarriedEdit::AddTo(const Camera& camera, const Image& depth, Image* pictur
   const RigidTransform world_from_camera = camera.camera_from_world.Inverse();
   std::vector<const Photo*> of_this;  // photos of the very view: all of their pixels count
   for (const Photo& photo : photos_)
-    if (SameView(camera, photo.camera)) of_this.push_back(&photo);
+    if (SameViewpoint(camera, photo.camera)) of_this.push_back(&photo);
 #pragma omp parallel for schedule(static)
   for (int y = 0; y < depth.height; ++y)
     for (int x = 0; x < depth.width; ++x) {

@@ -4,8 +4,8 @@
 #include <cmath>
 
 #include "kernels/base/error.h"
+#include "pipeline/run/fit_kind.h"
 #include "pipeline/run/profile_run.h"
-#include "pipeline/stages/field_fit.h"
 
 namespace regrade {
 namespace {
@@ -17,7 +17,7 @@ SceneBox BoxOf(const Capture& capture, const RunSettings& settings, const Vec3f&
   return box;
 }
 
-int DegreeOf(const RadianceField& field) {
+int DegreeOfField(const RadianceField& field) {
   return static_cast<int>(std::lround(std::sqrt(field.appearance.basis))) - 1;
 }
 
@@ -50,12 +50,12 @@ FittedPictures FitPictures(const WorkingViews& views, const StoredField& scene,
     throw InputError("the 2D method has a picture of none of the photos", "views_2d");
   const SceneBox box = BoxOf(views.capture(), settings, background);
   const std::unique_ptr<FieldFit> fit =
-      MakeFieldFit(settings, {.backend = backend,
-                              .pixels = pixels,
-                              .photos = std::ssize(training_views),
-                              .box = box,
-                              .device_coordinates = scene.ndc.on()});
-  fit->LimitDegree(DegreeOf(scene.field));
+      FitKindOf(settings).make(settings, {.backend = backend,
+                                          .pixels = pixels,
+                                          .photos = std::ssize(training_views),
+                                          .box = box,
+                                          .device_coordinates = scene.ndc.on()});
+  fit->LimitDegree(DegreeOfField(scene.field));
   FittedField field =
       fit->Run(training_views, {.progress = progress, .checkpoint = {}, .note = ""});
   FittedPictures fitted{{std::move(field.field), scene.field_from_world, scene.ndc},

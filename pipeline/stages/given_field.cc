@@ -32,8 +32,8 @@ StageOutcome ReadGivenField(RunContext* context, const ProgressFunction& progres
   SplatScene file = ReadForeignSplats(context->source, settings.run.max_memory_gb, nullptr);
   ReportOrThrow(progress, 1, 3);
   const int degree = DegreeOf(file.splats.basis);
-  SceneProfile profile =
-      ProfileScene(capture, degree, EffectsOf(settings, capture), settings.scene.box, true);
+  SceneProfile profile = ProfileScene(capture, degree, EffectsOf(settings, capture),
+                                      settings.scene.box, settings.scene.Kind());
   const NormalizedScene& scene = profile.scene;
   if (!scene.notice.empty()) context->console->Info(scene.notice);
   for (EffectReport& effect : profile.effects) {

@@ -18,9 +18,7 @@
 #include "pipeline/report/stage_metrics.h"
 #include "pipeline/run/plan.h"
 #include "pipeline/run/run_context.h"
-#include "pipeline/stages/foreign_splats.h"
-#include "pipeline/stages/splat_points.h"
-#include "pipeline/stages/splat_views.h"
+#include "pipeline/stages/scene_source.h"
 #include "pipeline/stages/stages.h"
 #include "pipeline/workspace/metrics_json.h"
 #include "reconstruct/colmap/photo_statuses.h"
@@ -175,25 +173,19 @@ StageOutcome FindPoses(RunContext* context, const CaptureSource& source,
     metrics.lens = report.lens;
   }
   PoseTracks tracks;
-  if (context->FromSplats()) {
-    const RadianceField field = FieldInItsWorld(
-        ReadForeignSplats(context->source, settings.run.max_memory_gb, context->console));
-    const FieldRenderer renderer(field,
-                                 ChooseBackend(settings.run.device, settings.run.reproducible));
-    AddSplatPoints(field, renderer, sparse_folder, source.poses, &capture);
-  } else if (source.kind != CaptureKind::kPhotos)
+  const SceneSource& given = SourceOf(*context);
+  if (given.has_points)
+    given.add_points(*context, sparse_folder, source.poses, &capture);
+  else if (source.kind != CaptureKind::kPhotos)
     tracks = AddTracks(options, settings.run.effects, sparse_folder, colmap_photos,
                        workspace.Path(".regrade/work/pose/tracks"), &capture,
                        parts.Next(seconds.tracks));
   if (!tracks.note.empty()) context->console->Info(tracks.note);
   if (!tracks.metrics.IsNull()) outcome.metrics["tracks"] = tracks.metrics;
   for (CaptureView& view : capture.views) view.path = photo_folder + "/" + view.name;
-  // Splats lie in the world of the poses as they are.
-  const std::string effects =
-      settings.run.effects + (context->FromSplats() ? ",pose-refinement=off" : "");
-  const PoseProfile profile =
-      ProfilePoses(source.kind, settings.pose, effects, sparse_folder, ingest.photos,
-                   tracks.misfit_scale, &capture, parts.Next(seconds.refinement));
+  const PoseProfile profile = ProfilePoses(
+      source.kind, settings.pose, settings.run.effects + given.pose_effects, sparse_folder,
+      ingest.photos, tracks.misfit_scale, &capture, parts.Next(seconds.refinement));
   context->console->Detail(EffectLine(profile.effect));
   outcome.metrics["effects"] = EffectsRecord({profile.effect});
   if (!profile.metrics.IsNull()) outcome.metrics["pose_refinement"] = profile.metrics;
@@ -215,7 +207,8 @@ StageOutcome FindPoses(RunContext* context, const CaptureSource& source,
 }  // namespace
 
 Stage PoseStage(RunContext* context) {
-  if (context->FromSplats() && !HasPhotosOfSplats(*context)) return SplatViewsStage(context);
+  const SceneSource& given = SourceOf(*context);
+  if (std::optional<Stage> own = given.pose(context)) return std::move(*own);
   const CaptureSource source = context->Source();
   Stage stage;
   stage.name = "pose";
@@ -247,7 +240,8 @@ Stage PoseStage(RunContext* context) {
   else
     for (const auto& [photo, mask] : source.masks)
       stage.inputs["photo_masks"][photo] = HashFile(mask);
-  if (context->FromSplats()) stage.inputs["splats"] = HashFile(context->source);
+  if (const JsonValue splats = given.hash(*context); !splats.IsNull())
+    stage.inputs["splats"] = splats;
   stage.refuse_changes = true;
   const InputFiles inputs = InputsOf(source);
   stage.plan =

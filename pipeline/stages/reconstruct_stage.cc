@@ -11,14 +11,13 @@
 #include "pipeline/program/cpu_time.h"
 #include "pipeline/program/device_choice.h"
 #include "pipeline/report/stage_metrics.h"
-#include "pipeline/run/fit_memory.h"
+#include "pipeline/run/fit_kind.h"
 #include "pipeline/run/paper_config.h"
 #include "pipeline/run/paper_traits.h"
 #include "pipeline/run/profile_run.h"
 #include "pipeline/run/run_context.h"
-#include "pipeline/stages/field_fit.h"
 #include "pipeline/stages/fit_quality.h"
-#include "pipeline/stages/given_field.h"
+#include "pipeline/stages/scene_source.h"
 #include "pipeline/stages/stages.h"
 #include "pipeline/workspace/folder_size.h"
 #include "pipeline/workspace/metrics_json.h"
@@ -103,7 +102,7 @@ StageOutcome Reconstruct(RunContext* context, const JsonValue& inputs,
   for (const std::string& notice : profile.notices) context->console->Info(notice);
   const FitPlace place = PlaceOf(settings, views, scene);
   const Backend backend = place.backend;
-  const std::unique_ptr<FieldFit> fit = MakeFieldFit(settings, place);
+  const std::unique_ptr<FieldFit> fit = FitKindOf(settings).make(settings, place);
   for (const std::string& sentence : fit->FitIntoMemory()) context->console->Info(sentence);
 
   const std::vector<int> training = views.Training();
@@ -197,7 +196,8 @@ void ChoosePaperSettings(RunContext* context) {
 }  // namespace
 
 Stage ReconstructStage(RunContext* context) {
-  if (context->FromSplats()) return GivenFieldStage(context);
+  if (std::optional<Stage> given = SourceOf(*context).reconstruct(context))
+    return std::move(*given);
   ChoosePaperSettings(context);
   const RunOptions& run = context->settings.run;
   Stage stage;
@@ -213,8 +213,9 @@ Stage ReconstructStage(RunContext* context) {
     const WorkingViews views = context->Views();
     const FitPlace place =
         PlaceOf(context->settings, views, SceneOfRun(context->settings, views.capture()));
-    stage.plan =
-        "about " + SizeText(PlanFieldFit(context->settings, place).memory) + " of memory";
+    stage.plan = "about " +
+                 SizeText(FitKindOf(context->settings).plan(context->settings, place).memory) +
+                 " of memory";
     if (const std::string warning = MemoryWarning(context->settings, place); !warning.empty())
       stage.plan_warnings.push_back(warning);
   }

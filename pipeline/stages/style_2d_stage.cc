@@ -99,7 +99,7 @@ Stage Style2dStage(RunContext* context) {
   const JsonValue gains = StoredGainRows(context->workspace->Path("poses"));
   if (!gains.IsNull()) stage.inputs["exposure"] = gains;
   if (std::filesystem::is_directory(context->workspace->Path("poses/masks")) ||
-      context->settings.scene.UsesSplats())
+      !context->settings.scene.Kind().lenses)
     stage.inputs["field"] = context->ResultOf("reconstruct");
   if (context->settings.object.On()) {
     stage.inputs["object"] = OptionValues(context->settings.object);

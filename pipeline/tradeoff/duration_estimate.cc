@@ -71,7 +71,8 @@ double DurationEstimate::Rough(const Variant& variant) const {
   settings.Bind(&options);
   if (variant.benchmark == "fit" || variant.benchmark == "style")
     options.ApplyConfig(variant.options, "tradeoff");
-  if (variant.benchmark == "fit") return PlanFieldFit(settings, place_of_(settings)).seconds;
+  if (variant.benchmark == "fit")
+    return FitKindOf(settings).plan(settings, place_of_(settings)).seconds;
   if (variant.benchmark == "style")
     return PlanStyle(settings.network.steps, omp_get_max_threads()).seconds;
   return variant.benchmark == "poses" ? kPoses : kFewSeconds;

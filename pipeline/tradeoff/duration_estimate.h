@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "pipeline/run/fit_memory.h"
+#include "pipeline/run/fit_kind.h"
 #include "pipeline/tradeoff/measurements.h"
 
 namespace regrade {

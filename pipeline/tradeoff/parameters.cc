@@ -4,20 +4,11 @@
 #include <cmath>
 
 #include "kernels/base/error.h"
+#include "pipeline/run/fit_kind.h"
 #include "pipeline/run/presets.h"
 
 namespace regrade {
 namespace {
-
-JsonValue Numbers(const std::vector<int>& values) {
-  return JsonValue::Array(values.begin(), values.end());
-}
-
-std::vector<int> Scaled(std::vector<int> values, double factor, int least) {
-  for (int& value : values)
-    value = std::max(least, static_cast<int>(std::lround(value * factor)));
-  return values;
-}
 
 std::string TextOf(const JsonValue& value) {
   if (value.IsString()) return value.AsString();
@@ -40,20 +31,26 @@ class VariantList {
 
   void AddBase(const std::string& benchmark) { variants_.push_back({benchmark, "", ""}); }
 
-  // Adds values from cheap to accurate, except the base's `own`, which is measured as the base.
-  void Add(const std::string& benchmark, const std::string& parameter, const JsonValue& own,
-           const std::vector<JsonValue>& values, bool last_is_accurate = true) {
+  // Adds values from cheap to accurate, except the base's own, which is measured as the base.
+  void Add(const MeasuredOption& measured) {
+    const std::string& parameter = measured.option;
     names_.push_back(parameter);
     if (!choice_.only.empty() &&
         std::ranges::find(choice_.only, parameter) == choice_.only.end())
       return;
-    for (const JsonValue& value : values) {
-      if (Same(value, own)) continue;
-      Variant variant{benchmark, parameter, TextOf(value)};
+    for (const JsonValue& value : measured.values) {
+      if (Same(value, measured.own)) continue;
+      Variant variant{measured.benchmark, parameter, TextOf(value)};
       variant.options[parameter] = value;
-      variant.accurate_end = last_is_accurate && &value == &values.back();
+      variant.accurate_end = measured.last_is_accurate && &value == &measured.values.back();
       variants_.push_back(std::move(variant));
     }
+  }
+  // Those of `all` in one benchmark, behind its base.
+  void AddBenchmark(const std::string& benchmark, const std::vector<MeasuredOption>& all) {
+    AddBase(benchmark);
+    for (const MeasuredOption& measured : all)
+      if (measured.benchmark == benchmark) Add(measured);
   }
 
   std::vector<Variant> Take() {
@@ -74,44 +71,18 @@ class VariantList {
   std::vector<std::string> names_;
 };
 
-void AddSplatParameters(const SplatFitOptions& splats, VariantList* list) {
-  const auto steps = [&](double factor) {
-    return JsonValue(std::max(1, static_cast<int>(std::lround(splats.steps * factor))));
-  };
-  const auto most = [&](float factor) { return factor * splats.thousands; };
-  list->Add("fit", "splat-steps", splats.steps, {steps(0.25), steps(0.5), steps(1), steps(2)});
-  list->Add("fit", "splats", splats.thousands, {most(0.25f), most(0.5f), most(1), most(2)});
-  list->Add("fit", "splat-degree", splats.sh_degree, {0, 1, 2});
-}
-
-void AddVoxelParameters(const RunSettings& base, VariantList* list) {
-  const FitOptions& fit = base.fit;
-  const auto steps = [&](double factor) { return Numbers(Scaled(fit.steps, factor, 1)); };
-  const auto grids = [&](double factor) {
-    return Numbers(Scaled(fit.resolutions, factor, 16));
-  };
-  const float step = fit.step, stop = fit.stop_transmittance;
-  list->Add("fit", "fit-steps", steps(1), {steps(0.25), steps(0.5), steps(1), steps(2)});
-  list->Add("fit", "fit-resolutions", grids(1), {grids(0.67), grids(1), grids(1.33)});
-  list->Add("fit", "fit-step-size", step, {2 * step, step, 0.5 * step});
-  list->Add("fit", "fit-stop", stop, {1e-2, 1e-3, 1e-4, 1e-6});
-  list->Add("fit", "sh-degree", fit.sh_degree, {0, 1, 2});
-  // Neither end is the accurate one: errors are relative to the base.
-  list->Add("fit", "fit-view-bound", fit.view_bound, {0.1, 0.2, 0.4, 1e6}, false);
-  // 4: sums do not depend on the number of threads.
-  list->Add("fit", "fit-shards", fit.shards, {0, 4});
-}
-
-void AddStyleParameters(const RunSettings& base, VariantList* list) {
+std::vector<MeasuredOption> MeasuredOfStyle(const RunSettings& base) {
   const TrainNetworkOptions& network = base.network;
   const auto steps = [&](double factor) {
     return JsonValue(std::max(1, static_cast<int>(std::lround(network.steps * factor))));
   };
-  list->Add("style", "style-steps", network.steps, {steps(1 / 3.0), steps(1), steps(3)});
-  list->Add("style", "style-patch", network.patch, {32, 8, 1});
-  list->Add("style", "style-min-weight", network.loss.min_weight, {1e-2, 1e-3, 0.0});
-  list->Add("style", "style-view-weight", network.loss.view_weight, {10.0, 1.0, 0.0});
-  list->Add("style", "style-norm-steps", network.norm_steps, {1, 5, 20});
+  return {
+      {"style", "style-steps", network.steps, {steps(1 / 3.0), steps(1), steps(3)}},
+      {"style", "style-patch", network.patch, {32, 8, 1}},
+      {"style", "style-min-weight", network.loss.min_weight, {1e-2, 1e-3, 0.0}},
+      {"style", "style-view-weight", network.loss.view_weight, {10.0, 1.0, 0.0}},
+      {"style", "style-norm-steps", network.norm_steps, {1, 5, 20}},
+  };
 }
 
 }  // namespace
@@ -130,29 +101,19 @@ JsonValue PresetOptions(const std::string& preset) {
 
 std::vector<Variant> VariantsOf(const RunSettings& base, const ParameterChoice& choice) {
   VariantList list(choice);
-  if (choice.poses) {
-    list.AddBase("poses");
-    const int size = base.pose.image_size;
-    list.Add("poses", "pose-image-size", size, {size * 6 / 10, size, size * 16 / 10});
-  }
-  list.AddBase("fit");
-  if (base.scene.UsesSplats())
-    AddSplatParameters(base.splats, &list);
-  else
-    AddVoxelParameters(base, &list);
-  if (choice.style) {
-    list.AddBase("style");
-    AddStyleParameters(base, &list);
-  }
-  if (!base.scene.UsesSplats()) {
-    list.AddBase("render");
-    // Ray marching, which has no options in a run: films use the field's step and 1e-4.
-    list.Add("render", "ray-stop", nullptr, {1e-2, 1e-3, 0.0});
-    list.Add("render", "ray-step", nullptr, {2.0, 0.5});
-  }
-  list.AddBase("flow");
-  list.Add("flow", "flow", base.consistency.flow,
-           {"dis-ultrafast", "dis-fast", "dis-medium", "farneback", "dis-tuned"});
+  const int size = base.pose.image_size;
+  if (choice.poses)
+    list.AddBenchmark(
+        "poses", {{"poses", "pose-image-size", size, {size * 6 / 10, size, size * 16 / 10}}});
+  const std::vector<MeasuredOption> of_field = FitKindOf(base).measured(base);
+  list.AddBenchmark("fit", of_field);
+  if (choice.style) list.AddBenchmark("style", MeasuredOfStyle(base));
+  list.AddBenchmark("render", of_field);
+  list.AddBenchmark("flow",
+                    {{"flow",
+                      "flow",
+                      base.consistency.flow,
+                      {"dis-ultrafast", "dis-fast", "dis-medium", "farneback", "dis-tuned"}}});
   std::vector<Variant> variants = list.Take();
   for (const std::string& preset : choice.presets)
     variants.push_back({"fit", "preset", preset, PresetOptions(preset)});

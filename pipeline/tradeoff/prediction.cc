@@ -8,8 +8,8 @@
 #include "pipeline/capture/working_views.h"
 #include "pipeline/fields/film_timing.h"
 #include "pipeline/report/cost_rows.h"
+#include "pipeline/run/fit_kind.h"
 #include "pipeline/stages/film_frames.h"
-#include "reconstruct/fit/adapt_options.h"
 #include "reconstruct/fit/choose_degree.h"
 
 namespace regrade {
@@ -23,14 +23,11 @@ struct StageUnits {
   std::vector<const char*> parameters;
 };
 
-constexpr char kVoxelWork[] = "ray voxels", kSplatWork[] = "planned seconds";
-
 std::vector<StageUnits> UnitsOf(const RunSettings& settings) {
+  const FitKind& kind = FitKindOf(settings);
   return {
       {"pose", {"photo megapixels"}, "", {}},
-      settings.scene.UsesSplats()
-          ? StageUnits{"reconstruct", {kSplatWork}, "fit", {"splat-steps", "splats"}}
-          : StageUnits{"reconstruct", {kVoxelWork}, "fit", {"fit-steps", "fit-resolutions"}},
+      {"reconstruct", {kind.work_unit}, "fit", {kind.work_options[0], kind.work_options[1]}},
       {"style_2d", {"staged pixels"}, "", {}},
       {"stylize", {"style rays", "photo pixels"}, "style", {"style-steps"}},
       {"render", {"frame pixels"}, "", {}},
@@ -154,15 +151,8 @@ double AmountOf(const std::string& unit, const RunSettings& settings, const Capt
       sum += static_cast<double>(view.camera.width) * view.camera.height;
     return sum;
   }
-  if (unit == kSplatWork) return PlanFieldFit(settings, PlaceOf(settings, capture)).seconds;
-  if (unit == kVoxelWork) {
-    const FitOptions fit =
-        AdaptOptions(settings.fit, {.pixels = PlaceOf(settings, capture).pixels});
-    double sum = 0;
-    for (size_t s = 0; s < std::min(fit.steps.size(), fit.resolutions.size()); ++s)
-      sum += static_cast<double>(fit.steps[s]) * fit.rays_per_step * fit.resolutions[s];
-    return sum;
-  }
+  for (const FitKind* kind : FitKinds())
+    if (unit == kind->work_unit) return kind->work(settings, PlaceOf(settings, capture));
   if (unit == "style rays")
     return static_cast<double>(settings.network.steps) *
            (settings.network.rays_per_step > 0 ? settings.network.rays_per_step : frame);
@@ -242,10 +232,11 @@ std::vector<StageTime> Predict(const std::vector<CostTerm>& costs, const RunSett
                                const Capture& capture) {
   std::vector<StageTime> times;
   for (const CostTerm& term : costs) {
-    if (term.unit == (settings.scene.UsesSplats() ? kVoxelWork : kSplatWork))
-      throw InputError(
-          "the costs are of fits of another kind of field", "--costs",
-          "measure them by `regrade tradeoff --field " + settings.scene.field + "`");
+    for (const FitKind* kind : FitKinds())
+      if (kind != &FitKindOf(settings) && term.unit == kind->work_unit)
+        throw InputError(
+            "the costs are of fits of another kind of field", "--costs",
+            "measure them by `regrade tradeoff --field " + settings.scene.field + "`");
     auto at = std::ranges::find(times, term.stage, &StageTime::stage);
     if (at == times.end()) at = times.insert(times.end(), {term.stage, 0, 0});
     const double amount = AmountOf(term.unit, settings, capture);

@@ -21,8 +21,8 @@
 #include "pipeline/fields/field_file.h"
 #include "pipeline/images/image_file.h"
 #include "pipeline/program/cpu_time.h"
+#include "pipeline/run/fit_kind.h"
 #include "pipeline/run/profile_run.h"
-#include "pipeline/stages/field_fit.h"
 #include "pipeline/stages/make_stylizer.h"
 #include "pipeline/stages/photo_metrics.h"
 #include "pipeline/stages/stages.h"
@@ -199,7 +199,7 @@ void VariantRunner::MeasureFit(const Variant& variant, const ProgressFunction& p
   set.ApplyConfig(variant.options, "tradeoff");
   const Photos& photos = PhotosAt(settings.scene.photo_size);
   settings.run.seed += static_cast<uint64_t>(m->repeat);
-  const std::unique_ptr<FieldFit> fit = MakeFieldFit(settings, photos.place);
+  const std::unique_ptr<FieldFit> fit = FitKindOf(settings).make(settings, photos.place);
   fit->FitIntoMemory();
   // The degree chosen by the base's trial, unless it is the parameter.
   const auto record = base_->workspace->Find("reconstruct");

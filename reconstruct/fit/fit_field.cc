@@ -89,7 +89,7 @@ class Fitter {
             "reconstruct",
             "check the poses against the photos, or give more photos that "
             "overlap by two thirds");
-      if (box_.spheres) {
+      if (box_.far_surroundings) {
         state.grid.spheres = MakeInitialSpheres(
             rays_, state.grid.frame, options_.background_layers, SphereResolution(0),
             options_.initial_background_density, state.grid.background);
@@ -143,17 +143,17 @@ class Fitter {
       const CellLevels levels = Levels();
       return MakeInitialCells(rays_, CellFrame(box_, coarsest, levels), levels, basis,
                               options_.initial_density, box_.near_clip, options_.initial_views,
-                              box_.spheres);
+                              box_.far_surroundings);
     }
     const GridFrame frame{GridOfStage(options_, box_, 0), box_.center, box_.radius};
     return MakeInitialGrid(rays_, frame, basis, options_.initial_density, box_.near_clip,
-                           options_.initial_views, box_.spheres);
+                           options_.initial_views, box_.far_surroundings);
   }
 
   // Spheres and device coordinates reach to infinity, and nothing is behind a transparent
   // photo.
   CellLevels Levels() const {
-    const bool bounded = !box_.spheres && box_.layers == 0 && !box_.background;
+    const bool bounded = !box_.far_surroundings && box_.layers == 0 && !box_.background;
     return {static_cast<int>(options_.resolutions.size()) - 1, bounded ? options_.outward : 0};
   }
 
@@ -180,7 +180,7 @@ class Fitter {
   void RunStage() {
     const int steps = options_.steps[static_cast<size_t>(stage_)];
     while (step_ < steps) {
-      if (box_.spheres && LeadSteps() > 0 && StepsBefore() == LeadSteps())
+      if (box_.far_surroundings && LeadSteps() > 0 && StepsBefore() == LeadSteps())
         engine_->EditState(
             [this](FitState* state) { SetDensities(options_.initial_density, &state->grid); });
       engine_->Step(NextStep());
@@ -222,7 +222,7 @@ class Fitter {
     step.tv_fraction = options_.tv_fraction;
     step.tv_density = decay * *options_.tv_density;
     step.tv_sh = decay * *options_.tv_sh;
-    if (!box_.spheres) return step;
+    if (!box_.far_surroundings) return step;
     step.optimizer.rate_sphere_density = ExponentialRate(
         options_.rate_background_density, options_.rate_background_density_end, p);
     step.optimizer.rate_sphere_color =

@@ -300,7 +300,7 @@ NormalizedScene NormalizeSurrounded(const Capture& capture, const Surroundings& 
                              : kFewPointsNearest * surroundings.half;
   // A larger near clip would leave nothing of the box.
   result.box.near_clip = static_cast<float>(std::min(nearest * s.scale, kMostNearClip));
-  result.box.spheres = true;
+  result.box.far_surroundings = true;
   return result;
 }
 

@@ -17,7 +17,7 @@ struct SceneBox {
   float voxel_aspect = 1;
   std::optional<Vec3f> background;  // sRGB behind everything; default: the photos' mean colour
   // Fits what is far outside of the box: voxels on spheres, splats from far starts.
-  bool spheres = false;
+  bool far_surroundings = false;
 };
 
 // Vertices per axis, `longest` on the longest side; voxels are cubes up to rounding. With

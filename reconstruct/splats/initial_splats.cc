@@ -167,7 +167,7 @@ Splats InitialSplats(const std::vector<TrainingView>& views, const SplatPhotos& 
                      "reconstruct",
                      "check the poses against the photos, or give more photos that overlap by "
                      "two thirds");
-  if (box.spheres && !box.background)
+  if (box.far_surroundings && !box.background)
     AddFarStarts(photos, box, static_cast<int64_t>(kFarShare * static_cast<double>(most)),
                  &starts);
   if (starts.size() > most) {  // evenly

@@ -2,10 +2,10 @@
 #include "kernels/device/launch_size.h"
 #include "kernels/field/background_spheres.h"
 #include "kernels/field/cuda/gradient_view.h"
+#include "kernels/field/splat_position.h"
 #include "stylize/cuda/device_rows.h"
 #include "stylize/cuda/warp_item.h"
 #include "stylize/cuda/warp_row.h"
-#include "stylize/field/splat_position.h"
 #include "stylize/field/view_penalty.h"
 
 namespace regrade {

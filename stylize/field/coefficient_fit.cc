@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "kernels/base/error.h"
+#include "kernels/field/field_kind.h"
 #include "kernels/field/pad_sh_basis.h"
 #include "kernels/field/spherical_harmonics.h"
 #include "stylize/field/residual_rays.h"
@@ -23,7 +24,7 @@ class Coefficients {
     for (size_t i = 0; i < cameras.size(); ++i)
       AddResidualRays(field, cameras[i], missing[i], most, options.seed + i, &rays_,
                       &directions_);
-    of_entries_ = field.geometry->splats.on();
+    of_entries_ = KindOf(*field.geometry).own_directions;
     harmonics_ = options.harmonics;
     // Most voxels are seen by no ray: memory follows those that are.
     std::vector<int32_t> place(static_cast<size_t>(field.geometry->num_voxels()), -1);

@@ -6,6 +6,7 @@
 #include <numeric>
 
 #include "kernels/base/error.h"
+#include "kernels/field/field_kind.h"
 #include "kernels/field/trilinear.h"
 #include "stylize/field/base_map.h"
 #include "stylize/field/color_error.h"
@@ -42,7 +43,7 @@ GradientAggregation::GradientAggregation(const RadianceField& field,
       options_(options),
       weigher_(MakeRayWeigher(*field.geometry, field.near_clip, options.march,
                               options.min_weight, kManyViews)),
-      corners_(field.geometry->splats.on() ? 1 : 8),
+      corners_(KindOf(*field.geometry).sample_points),
       row_(RowOf(field.appearance.basis)),
       vertex_of_voxel_(VertexOfVoxel(*field.geometry)),
       place_of_column_(PlaceOfColumn(field.geometry->spheres)),

@@ -7,8 +7,8 @@
 
 #include "kernels/base/error.h"
 #include "kernels/field/background_spheres.h"
+#include "kernels/field/field_kind.h"
 #include "kernels/network/lipschitz_layer.h"
-#include "stylize/field/splat_position.h"
 #include "stylize/spectral_norm.h"
 
 namespace regrade {
@@ -226,33 +226,11 @@ double LipschitzNetwork::SmallestK() const {
 
 std::vector<int32_t> VertexOfVoxel(const Geometry& geometry) {
   std::vector<int32_t> vertex(geometry.num_voxels(), -1);
-  if (geometry.cells.on() || geometry.splats.on()) std::iota(vertex.begin(), vertex.end(), 0);
+  if (geometry.links.size() == 0) std::iota(vertex.begin(), vertex.end(), 0);
   for (int64_t i = 0; i < geometry.links.size(); ++i)
     if (geometry.links[i] >= 0) vertex[geometry.links[i]] = static_cast<int32_t>(i);
   return vertex;
 }
-
-namespace {
-
-Vec3f PositionOfSplat(const Geometry& geometry, int64_t splat) {
-  const float* const mean = geometry.splats.mean.data() + 3 * splat;
-  return SplatPosition(geometry.frame, {mean[0], mean[1], mean[2]});
-}
-
-// [-1, 1] across the box.
-Vec3f VoxelPosition(const Geometry& geometry, int32_t vertex) {
-  const Vec3i n = geometry.frame.resolution;
-  Vec3f place{0.5f, 0.5f, 0.5f};  // voxels from the box's corner
-  if (geometry.cells.on())
-    place = PlaceOf(geometry.cells.vertex_key[vertex]).Cast<float>();
-  else
-    place += Vec3i{vertex / (n.y * n.z), vertex / n.z % n.y, vertex % n.z}.Cast<float>();
-  Vec3f position;
-  for (int a = 0; a < 3; ++a) position[a] = 2 * place[a] / static_cast<float>(n[a]) - 1;
-  return position;
-}
-
-}  // namespace
 
 void FillFeatures(const RadianceField& field, float position_scale, int64_t voxel,
                   int32_t vertex, float* row) {
@@ -261,9 +239,7 @@ void FillFeatures(const RadianceField& field, float position_scale, int64_t voxe
   const float* sh = field.appearance.sh.data() + voxel * field.appearance.stride();
   std::fill_n(row, shape.stride(), 0.0f);
   for (int c = 0; c < 3; ++c) std::copy_n(sh + c * basis, basis, row + c * shape.basis);
-  const Geometry& geometry = *field.geometry;
-  const Vec3f position =
-      geometry.splats.on() ? PositionOfSplat(geometry, voxel) : VoxelPosition(geometry, vertex);
+  const Vec3f position = KindOf(*field.geometry).position_of(*field.geometry, voxel, vertex);
   for (int a = 0; a < 3; ++a) row[shape.sh() + a] = position_scale * position[a];
 }
 

@@ -4,6 +4,7 @@
 
 #include "kernels/base/error.h"
 #include "kernels/base/random.h"
+#include "kernels/field/field_kind.h"
 #include "kernels/field/trilinear.h"
 #include "kernels/render/ray_weigher.h"
 
@@ -16,7 +17,7 @@ void AddResidualRays(const RadianceField& field, const Camera& camera, const Ima
   constexpr float kLeastWeight = 1e-4f;
   const double chosen =
       std::min(1.0, static_cast<double>(most) / static_cast<double>(missing.num_pixels()));
-  const bool splats = field.geometry->splats.on();
+  const bool own_directions = KindOf(*field.geometry).own_directions;
   ViewRays some{.cameras = {camera}};
   for (int64_t i = 0; i < missing.num_pixels(); ++i) {
     if (!(RandomDouble(seed, 0, static_cast<uint64_t>(i)) < chosen)) continue;
@@ -24,7 +25,7 @@ void AddResidualRays(const RadianceField& field, const Camera& camera, const Ima
     const Vec3f lack{p[0], p[1], p[2]};
     if (!AllFinite(lack)) continue;
     some.AddPixel(0, static_cast<int>(i % missing.width), static_cast<int>(i / missing.width));
-    if (directions && !splats) directions->push_back(some.rays.back().direction);
+    if (directions && !own_directions) directions->push_back(some.rays.back().direction);
     rays->missing.push_back(lack);
     rays->share.push_back(static_cast<float>(1 / chosen));
   }
@@ -61,7 +62,7 @@ void AddResidualRays(const RadianceField& field, const Camera& camera, const Ima
         }
         rays->voxel.push_back(row[i].voxel);
         rays->weight.push_back(row[i].weight);
-        if (directions && splats)
+        if (directions && own_directions)
           directions->push_back(weights.directions[static_cast<size_t>(row[i].sample)]);
       }
       rays->first.push_back(std::ssize(rays->voxel));

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "kernels/base/error.h"
+#include "kernels/field/field_kind.h"
 #include "kernels/field/sample_basis.h"
 #include "kernels/field/trilinear.h"
 #include "kernels/render/ray_weigher.h"
@@ -105,7 +106,7 @@ class Observer {
   // The right side of EQ(vrr-bound).
   double Bound(const Seen& a, const Seen& b) const {
     double changed = 0, mean[3 * kMaxBasis] = {};
-    const bool splats = source_.geometry->splats.on();
+    const bool own_directions = KindOf(*source_.geometry).own_directions;
     const double gamma_norm = std::sqrt(basis_) * kSh0;
     Couple(a, b, [&](const Atom& one, const Atom& other, double moved) {
       if (one.voxel == kBackground || other.voxel == kBackground) {
@@ -115,10 +116,10 @@ class Observer {
       changed += moved * gamma_norm * residual_bound_ * Distance(one.voxel, other.voxel);
       double g[3 * kMaxBasis];
       Residual(other.voxel, g);
-      if (splats) changed += moved * Turn(one.direction, other.direction) * NormOf(g);
+      if (own_directions) changed += moved * Turn(one.direction, other.direction) * NormOf(g);
       for (int i = 0; i < 3 * basis_; ++i) mean[i] += moved * g[i];
     });
-    if (!splats) changed += Turn(a.direction, b.direction) * NormOf(mean);
+    if (!own_directions) changed += Turn(a.direction, b.direction) * NormOf(mean);
     return base_norm_ * Norm(a.closed_source - b.closed_source) + changed;
   }
   // The mix of an object's style has the constant 1 - e + e K at most.

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "kernels/field/cell_lattice.h"
+#include "kernels/field/field_kind.h"
 #include "kernels/field/spherical_harmonics.h"
 #include "stylize/field/lipschitz_network.h"
 #include "stylize/field/nearest_points.h"
@@ -33,8 +34,8 @@ void AddCellEdges(const CellGrid& cells, std::vector<std::array<int32_t, 2>>* ed
   KeepEachOnce(edges);
 }
 
-void AddSplatEdges(const std::vector<Vec3f>& positions,
-                   std::vector<std::array<int32_t, 2>>* edges) {
+void AddNearestEdges(const std::vector<Vec3f>& positions,
+                     std::vector<std::array<int32_t, 2>>* edges) {
   const std::vector<int32_t> nearest = NearestPoints(positions, kNearest);
   for (size_t i = 0; i < nearest.size(); ++i) {
     const int32_t a = static_cast<int32_t>(i / kNearest), b = nearest[i];
@@ -43,17 +44,15 @@ void AddSplatEdges(const std::vector<Vec3f>& positions,
   KeepEachOnce(edges);
 }
 
-// See EQ(splat-position); in the box's proportions: within [-2, 2].
-std::vector<Vec3f> SplatPositions(const RadianceField& field) {
-  const Vec3f& radius = field.geometry->frame.radius;
+// In the box's proportions: within [-2, 2], see EQ(splat-position).
+std::vector<Vec3f> PositionsOffLattice(const Geometry& geometry, const FieldKind& kind) {
+  const Vec3f& radius = geometry.frame.radius;
   const float longest = std::max({radius.x, radius.y, radius.z});
   std::vector<Vec3f> positions;
-  for (int64_t v = 0; v < field.geometry->num_voxels(); ++v) {
-    float row[kLargestRow.stride()];
-    FillFeatures(field, 1, v, static_cast<int32_t>(v), row);
-    Vec3f& position = positions.emplace_back();
-    for (int a = 0; a < 3; ++a)
-      position[a] = row[RowOf(field.appearance.basis).sh() + a] * radius[a] / longest;
+  for (int64_t v = 0; v < geometry.num_voxels(); ++v) {
+    Vec3f& position =
+        positions.emplace_back(kind.position_of(geometry, v, static_cast<int32_t>(v)));
+    for (int a = 0; a < 3; ++a) position[a] = position[a] * radius[a] / longest;
   }
   return positions;
 }
@@ -107,9 +106,9 @@ VoxelGraph GraphOf(const RadianceField& field) {
   const std::vector<int32_t> vertex = VertexOfVoxel(geometry);
   std::vector<Vec3i> places(vertex.size());
   const Vec3i n = geometry.frame.resolution;
-  if (geometry.splats.on()) {
-    const std::vector<Vec3f> positions = SplatPositions(field);
-    AddSplatEdges(positions, &graph.edges);
+  if (const FieldKind& kind = KindOf(geometry); !kind.lattice) {
+    const std::vector<Vec3f> positions = PositionsOffLattice(geometry, kind);
+    AddNearestEdges(positions, &graph.edges);
     for (size_t v = 0; v < places.size(); ++v)
       for (int a = 0; a < 3; ++a)
         places[v][a] = static_cast<int32_t>((positions[v][a] + 2) * (kPlacesAcross / 2));

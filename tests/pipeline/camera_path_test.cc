@@ -7,6 +7,7 @@
 #include <cmath>
 #include <memory>
 
+#include "kernels/render/optical_depth.h"
 #include "kernels/splats/splat_field.h"
 #include "pipeline/fields/film_timing.h"
 #include "pipeline/fields/path_clearance.h"

@@ -17,7 +17,7 @@ PackedCapture SmallCapture() {
   capture.scene.box.radius = {1, 0.5f, 0.75f};
   capture.scene.box.near_clip = 0.125f;
   capture.scene.box.layers = 128;
-  capture.scene.box.spheres = true;
+  capture.scene.box.far_surroundings = true;
   capture.scene.box.background = Vec3f{1, 0.5f, 0};
   for (int i = 0; i < 3; ++i) {
     PackedView view;
@@ -51,7 +51,7 @@ TEST(PackedCapture, ReadsBackAsWritten) {
   EXPECT_EQ(back.scene.ndc.b, 2);
   EXPECT_EQ(back.scene.box.radius, capture.scene.box.radius);
   EXPECT_EQ(back.scene.box.layers, 128);
-  EXPECT_TRUE(back.scene.box.spheres);
+  EXPECT_TRUE(back.scene.box.far_surroundings);
   ASSERT_TRUE(back.scene.box.background);
   EXPECT_EQ(*back.scene.box.background, *capture.scene.box.background);
   EXPECT_EQ(back.style.num_pixels(), 0);

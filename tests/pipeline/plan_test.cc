@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-#include "pipeline/run/fit_memory.h"
+#include "pipeline/run/fit_kind.h"
 #include "pipeline/run/stage_estimate.h"
 #include "tests/support/expect_error.h"
 

@@ -6,6 +6,7 @@
 #include <set>
 
 #include "kernels/render/field_renderer.h"
+#include "kernels/render/voxel_renderer.h"
 #include "pipeline/files/json_file.h"
 #include "pipeline/images/image_file.h"
 #include "tests/support/source_dir.h"

@@ -121,35 +121,37 @@ Capture CaptureSeenAllRound(int far) {
 // H153, H156: layers where much is far all round, measured, and no trace of them elsewhere.
 TEST(SceneProfile, H153_H156_FarSurroundingsUseSpheres) {
   const SceneProfile near = ProfileScene(CaptureSeenAllRound(0), 2, "exposure=off");
-  EXPECT_FALSE(near.scene.box.spheres);
+  EXPECT_FALSE(near.scene.box.far_surroundings);
   EXPECT_EQ(near.effects[3].name, "background");
   EXPECT_EQ(*near.effects[3].value.value, 0);
   const SceneProfile far = ProfileScene(CaptureSeenAllRound(5), 2, "exposure=off");
-  EXPECT_TRUE(far.scene.box.spheres);
+  EXPECT_TRUE(far.scene.box.far_surroundings);
   EXPECT_NEAR(*far.effects[3].value.value, 0.2, 1e-12);  // 5 of 25
   // The box is the cube that reaches the cameras, upright along y: 2.02 m are 0.9 of its half.
   EXPECT_EQ(far.scene.box.radius, (Vec3f{1, 1, 1}));
   EXPECT_NEAR(far.scene.field_from_world.scale, 0.9 / std::hypot(2.0, 0.3), 1e-3);
   EXPECT_NEAR(far.scene.field_from_world.rotation(1, 2), 1, 1e-9);
   // An override decides; contradictions are named.
-  EXPECT_FALSE(
-      ProfileScene(CaptureSeenAllRound(5), 2, "background=off,exposure=off").scene.box.spheres);
-  EXPECT_TRUE(
-      ProfileScene(CaptureSeenAllRound(0), 2, "background=on,exposure=off").scene.box.spheres);
+  EXPECT_FALSE(ProfileScene(CaptureSeenAllRound(5), 2, "background=off,exposure=off")
+                   .scene.box.far_surroundings);
+  EXPECT_TRUE(ProfileScene(CaptureSeenAllRound(0), 2, "background=on,exposure=off")
+                  .scene.box.far_surroundings);
   EXPECT_REGRADE_ERROR(
       ProfileScene(CaptureSeenAllRound(5), 2, "background=on,alpha=on,exposure=off"),
       ExitCode::kUsage, "alpha");
 }
 
 TEST(SceneProfile, FarSurroundingsOfSplatsLeaveTheBoxAsItIs) {
-  const SceneProfile near = ProfileScene(CaptureSeenAllRound(0), 2, "exposure=off", {}, true);
-  EXPECT_FALSE(near.scene.box.spheres);
-  const SceneProfile far = ProfileScene(CaptureSeenAllRound(5), 2, "exposure=off", {}, true);
-  EXPECT_TRUE(far.scene.box.spheres);
+  const SceneProfile near =
+      ProfileScene(CaptureSeenAllRound(0), 2, "exposure=off", {}, KindNamed("splats"));
+  EXPECT_FALSE(near.scene.box.far_surroundings);
+  const SceneProfile far =
+      ProfileScene(CaptureSeenAllRound(5), 2, "exposure=off", {}, KindNamed("splats"));
+  EXPECT_TRUE(far.scene.box.far_surroundings);
   EXPECT_EQ(far.effects[3].on, true);
-  const SceneProfile without =
-      ProfileScene(CaptureSeenAllRound(5), 2, "background=off,exposure=off", {}, true);
-  EXPECT_FALSE(without.scene.box.spheres);
+  const SceneProfile without = ProfileScene(
+      CaptureSeenAllRound(5), 2, "background=off,exposure=off", {}, KindNamed("splats"));
+  EXPECT_FALSE(without.scene.box.far_surroundings);
   EXPECT_EQ(without.scene.box.radius, far.scene.box.radius);
   EXPECT_EQ(without.scene.field_from_world.scale, far.scene.field_from_world.scale);
 }
@@ -167,7 +169,7 @@ TEST(SceneProfile, OptionsOfTheBoxReplaceMeasurements) {
     EXPECT_NEAR(given.scene.field_from_world.scale, 2 / std::hypot(2.0, 0.3), 1e-3);
     EXPECT_EQ(given.scene.box.near_clip, 0.0f);
     EXPECT_EQ(given.scene.box.background.value(), (Vec3f{0.5f, 0.5f, 0.5f}));
-    EXPECT_EQ(given.scene.box.spheres, std::string(background) == "background=on");
+    EXPECT_EQ(given.scene.box.far_surroundings, std::string(background) == "background=on");
   }
 }
 

@@ -71,7 +71,7 @@ TEST_F(CellFit, AStageThatIsLeftOutChangesNothing) {
 }
 
 TEST_F(CellFit, TheBackgroundsMapsGrowWithTheStages) {
-  box_.spheres = true;
+  box_.far_surroundings = true;
   options_.background_layers = 4;
   options_.background_resolution = 32;
   EXPECT_EQ(Fit().field.geometry->spheres.resolution, 32);
@@ -275,7 +275,7 @@ TEST(FitOfWrongPoses, NoPlaceIsSeenByTwoPhotos) {
     EXPECT_REGRADE_ERROR(FitField(outward, {}, options, {}), ExitCode::kScene,
                          "no place is seen by two of the 3 photos");
     SceneBox spheres;
-    spheres.spheres = true;
+    spheres.far_surroundings = true;
     EXPECT_REGRADE_ERROR(FitField(outward, spheres, options, {}), ExitCode::kScene,
                          "no place is seen by two of the 3 photos");
   }

@@ -95,7 +95,7 @@ class FitSpheres : public FitField {
 
 TEST_F(FitSpheres, DistantSurroundingsAreFitted) {
   const double without = HeldOutPsnr(Fit().field);
-  box_.spheres = true;
+  box_.far_surroundings = true;
   const FitResult with = Fit();
   EXPECT_TRUE(with.field.geometry->spheres.on());
   EXPECT_EQ(with.rejected_voxels, 0);
@@ -104,7 +104,7 @@ TEST_F(FitSpheres, DistantSurroundingsAreFitted) {
 }
 
 TEST_F(FitSpheres, H109_H110_AResumedFitIsTheUndisturbedOne) {
-  box_.spheres = true;
+  box_.far_surroundings = true;
   options_.steps = {40, 40};
   options_.background_lead = 0.5f;
   const FitResult straight = FitWithThreads(1);

@@ -39,7 +39,7 @@ class FarStarts : public ::testing::Test {
     return colors;
   }
 
-  SceneBox box_{.spheres = true};
+  SceneBox box_{.far_surroundings = true};
   SplatFitOptions options_{.thousands = 4};
 };
 

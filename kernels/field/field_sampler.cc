@@ -1,4 +1,4 @@
-#include "pipeline/fields/field_sampler.h"
+#include "kernels/field/field_sampler.h"
 
 #include <algorithm>
 

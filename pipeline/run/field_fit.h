@@ -1,4 +1,4 @@
-// The fit of a scene's field to pictures, of the kind that --field names.
+// The fit of a scene's field to pictures; FitKind makes one of the kind that --field names.
 #pragma once
 
 #include <functional>
@@ -11,8 +11,6 @@
 #include "kernels/base/progress.h"
 #include "kernels/field/radiance_field.h"
 #include "pipeline/report/stage_metrics.h"
-#include "pipeline/run/fit_memory.h"
-#include "pipeline/run/run_settings.h"
 #include "reconstruct/fit/choose_degree.h"
 #include "reconstruct/fit/training_rays.h"
 
@@ -53,11 +51,6 @@ class FieldFit {
   // The options that were used, and the field's size.
   virtual void Describe(const RadianceField& field, ReconstructReport* report) const = 0;
 };
-
-// With `settings` adapted to `place`. Seeds and sums follow the settings, too.
-std::unique_ptr<FieldFit> MakeFieldFit(const RunSettings& settings, const FitPlace& place);
-std::unique_ptr<FieldFit> MakeVoxelFit(const RunSettings& settings, const FitPlace& place);
-std::unique_ptr<FieldFit> MakeSplatFit(const RunSettings& settings, const FitPlace& place);
 
 // To a thousandth, for charts.
 double RoundedForChart(double value);

@@ -1,10 +1,11 @@
+#include "pipeline/run/voxel_fit.h"
+
 #include <algorithm>
 #include <cmath>
 #include <utility>
 
 #include "pipeline/fields/fit_checkpoint.h"
 #include "pipeline/run/paper_config.h"
-#include "pipeline/stages/field_fit.h"
 #include "reconstruct/fit/adapt_options.h"
 #include "reconstruct/fit/fit_field.h"
 
@@ -66,7 +67,8 @@ class VoxelFit : public FieldFit {
     report->finest_grid = *std::ranges::max_element(options_.resolutions);
     report->sh_degree = options_.sh_degree;
     report->voxels = field.geometry->num_voxels();
-    if (place_.box.spheres) report->background_texels = field.geometry->spheres.num_texels();
+    if (place_.box.far_surroundings)
+      report->background_texels = field.geometry->spheres.num_texels();
     if (report->paper_config.empty()) return;
     RunSettings used = settings_;
     used.fit = options_;
@@ -81,10 +83,78 @@ class VoxelFit : public FieldFit {
   std::optional<FitState> resume_;
 };
 
-}  // namespace
+JsonValue Numbers(const std::vector<int>& values) {
+  return JsonValue::Array(values.begin(), values.end());
+}
+
+std::vector<int> Scaled(std::vector<int> values, double factor, int least) {
+  for (int& value : values)
+    value = std::max(least, static_cast<int>(std::lround(value * factor)));
+  return values;
+}
+
+JsonValue OptionsOfVoxels(const RunSettings& settings) { return OptionValues(settings.fit); }
+
+int DegreeOfVoxels(const RunSettings& settings) { return settings.fit.sh_degree; }
+
+void CheckVoxelSettings(const RunSettings&) {}
+
+StagePlan PlanVoxels(const RunSettings& settings, const FitPlace& place) {
+  return PlanFitAt(place, AdaptedTo(settings.fit, place));
+}
+
+std::string LoweredVoxels(const RunSettings& settings, const FitPlace& place) {
+  return FitWithinMemory(AdaptedTo(settings.fit, place), place).notice;
+}
+
+// Rays times the grid's side.
+double RayVoxels(const RunSettings& settings, const FitPlace& place) {
+  const FitOptions fit = AdaptOptions(settings.fit, {.pixels = place.pixels});
+  double sum = 0;
+  for (size_t s = 0; s < std::min(fit.steps.size(), fit.resolutions.size()); ++s)
+    sum += static_cast<double>(fit.steps[s]) * fit.rays_per_step * fit.resolutions[s];
+  return sum;
+}
+
+std::vector<MeasuredOption> MeasuredOfVoxels(const RunSettings& settings) {
+  const FitOptions& fit = settings.fit;
+  const auto steps = [&](double factor) { return Numbers(Scaled(fit.steps, factor, 1)); };
+  const auto grids = [&](double factor) {
+    return Numbers(Scaled(fit.resolutions, factor, 16));
+  };
+  const float step = fit.step, stop = fit.stop_transmittance;
+  return {
+      {"fit", "fit-steps", steps(1), {steps(0.25), steps(0.5), steps(1), steps(2)}},
+      {"fit", "fit-resolutions", grids(1), {grids(0.67), grids(1), grids(1.33)}},
+      {"fit", "fit-step-size", step, {2 * step, step, 0.5 * step}},
+      {"fit", "fit-stop", stop, {1e-2, 1e-3, 1e-4, 1e-6}},
+      {"fit", "sh-degree", fit.sh_degree, {0, 1, 2}},
+      // Neither end is the accurate one: errors are relative to the base.
+      {"fit", "fit-view-bound", fit.view_bound, {0.1, 0.2, 0.4, 1e6}, false},
+      // 4: sums do not depend on the number of threads.
+      {"fit", "fit-shards", fit.shards, {0, 4}},
+      // Ray marching, which has no options in a run: films use the field's step and 1e-4.
+      {"render", "ray-stop", nullptr, {1e-2, 1e-3, 0.0}},
+      {"render", "ray-step", nullptr, {2.0, 0.5}},
+  };
+}
 
 std::unique_ptr<FieldFit> MakeVoxelFit(const RunSettings& settings, const FitPlace& place) {
   return std::make_unique<VoxelFit>(settings, place);
 }
+
+}  // namespace
+
+const FitKind kVoxelFit{.name = "voxels",
+                        .work_unit = "ray voxels",
+                        .work_options = {"fit-steps", "fit-resolutions"},
+                        .options = OptionsOfVoxels,
+                        .sh_degree = DegreeOfVoxels,
+                        .check = CheckVoxelSettings,
+                        .plan = PlanVoxels,
+                        .lowered = LoweredVoxels,
+                        .work = RayVoxels,
+                        .measured = MeasuredOfVoxels,
+                        .make = MakeVoxelFit};
 
 }  // namespace regrade

@@ -1,10 +1,13 @@
+#include "pipeline/run/splat_fit.h"
+
 #include <algorithm>
 #include <cmath>
 #include <utility>
 
+#include "kernels/base/error.h"
 #include "kernels/splats/splat_field.h"
+#include "pipeline/capture/effect_words.h"
 #include "pipeline/fields/splat_checkpoint.h"
-#include "pipeline/stages/field_fit.h"
 #include "reconstruct/splats/fit_splats.h"
 
 namespace regrade {
@@ -73,10 +76,63 @@ class SplatFit : public FieldFit {
   std::optional<SplatFitState> resume_;
 };
 
-}  // namespace
+JsonValue OptionsOfSplats(const RunSettings& settings) { return OptionValues(settings.splats); }
+
+int DegreeOfSplats(const RunSettings& settings) { return settings.splats.sh_degree; }
+
+// What belongs to voxels alone.
+void CheckSplatSettings(const RunSettings& settings) {
+  if (settings.run.preset == "paper")
+    throw UsageError("the paper's field has voxels", "--field splats and --preset paper",
+                     "leave one of them out");
+  const auto effects = ParseEffects(settings.run.effects);
+  for (const char* name : {"ndc", "background"})
+    if (const auto effect = effects.find(name); effect != effects.end() && effect->second)
+      throw UsageError("belongs to voxels", Concat("--effects ", name, "=on"),
+                       "leave it out, or use --field voxels");
+}
+
+StagePlan PlanSplats(const RunSettings& settings, const FitPlace& place) {
+  return PlanSplatsAt(place, AtMostOfPixels(settings.splats, place));
+}
+
+std::string LoweredSplats(const RunSettings& settings, const FitPlace& place) {
+  return SplatsWithinMemory(settings.splats, place).notice;
+}
+
+double PlannedSeconds(const RunSettings& settings, const FitPlace& place) {
+  return PlanSplats(settings, place).seconds;
+}
+
+std::vector<MeasuredOption> MeasuredOfSplats(const RunSettings& settings) {
+  const SplatFitOptions& splats = settings.splats;
+  const auto steps = [&](double factor) {
+    return JsonValue(std::max(1, static_cast<int>(std::lround(splats.steps * factor))));
+  };
+  const auto most = [&](float factor) { return factor * splats.thousands; };
+  return {
+      {"fit", "splat-steps", splats.steps, {steps(0.25), steps(0.5), steps(1), steps(2)}},
+      {"fit", "splats", splats.thousands, {most(0.25f), most(0.5f), most(1), most(2)}},
+      {"fit", "splat-degree", splats.sh_degree, {0, 1, 2}},
+  };
+}
 
 std::unique_ptr<FieldFit> MakeSplatFit(const RunSettings& settings, const FitPlace& place) {
   return std::make_unique<SplatFit>(settings, place);
 }
+
+}  // namespace
+
+const FitKind kSplatFit{.name = "splats",
+                        .work_unit = "planned seconds",
+                        .work_options = {"splat-steps", "splats"},
+                        .options = OptionsOfSplats,
+                        .sh_degree = DegreeOfSplats,
+                        .check = CheckSplatSettings,
+                        .plan = PlanSplats,
+                        .lowered = LoweredSplats,
+                        .work = PlannedSeconds,
+                        .measured = MeasuredOfSplats,
+                        .make = MakeSplatFit};
 
 }  // namespace regrade

@@ -1,4 +1,4 @@
-// Where a splat is, as the network that restyles it sees it.
+// The position of a splat in the box, as whoever compares positions of records has it.
 #pragma once
 
 #include <cmath>

@@ -1,0 +1,50 @@
+// What is known of a fit before it begins, and how it is made, for each kind of field.
+#pragma once
+
+#include <array>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "pipeline/run/field_fit.h"
+#include "pipeline/run/fit_memory.h"
+#include "pipeline/run/run_settings.h"
+
+namespace regrade {
+
+// An option whose values `regrade tradeoff` compares, from cheap to accurate.
+struct MeasuredOption {
+  std::string benchmark, option;
+  JsonValue own;  // the settings' value; null of what is no option of a run
+  std::vector<JsonValue> values;
+  bool last_is_accurate = true;
+};
+
+struct FitKind {
+  const char* name;       // "voxels" or "splats", as --field has it
+  const char* work_unit;  // to which the time of a fit's steps is proportional
+  std::array<const char*, 2> work_options;  // which change it
+
+  JsonValue (*options)(const RunSettings& settings);
+  int (*sh_degree)(const RunSettings& settings);
+  // What this kind cannot go with. Throws Error(kUsage).
+  void (*check)(const RunSettings& settings);
+  // Before it is lowered to what memory holds.
+  StagePlan (*plan)(const RunSettings& settings, const FitPlace& place);
+  // What it is lowered to, or an empty text. Throws Error(kResources).
+  std::string (*lowered)(const RunSettings& settings, const FitPlace& place);
+  double (*work)(const RunSettings& settings, const FitPlace& place);  // in work_unit
+  std::vector<MeasuredOption> (*measured)(const RunSettings& settings);
+  // With `settings` adapted to `place`. Seeds and sums follow the settings, too.
+  std::unique_ptr<FieldFit> (*make)(const RunSettings& settings, const FitPlace& place);
+};
+
+const std::array<const FitKind*, 2>& FitKinds();
+// Of the field that the settings name.
+const FitKind& FitKindOf(const RunSettings& settings);
+
+// What a person should know of the fit's memory before it begins: that less than it takes is
+// free, and what it is lowered to; or nothing.
+std::string MemoryWarning(const RunSettings& settings, const FitPlace& place);
+
+}  // namespace regrade
