@@ -1,10 +1,12 @@
 #include "pipeline/commands/export_fields.h"
 
 #include <filesystem>
+#include <optional>
 #include <utility>
 #include <vector>
 
 #include "kernels/base/error.h"
+#include "pipeline/capture/capture_store.h"
 #include "pipeline/commands/compared_renders.h"
 #include "pipeline/commands/export_splats.h"
 #include "pipeline/commands/page_styles.h"
@@ -12,7 +14,10 @@
 #include "pipeline/fields/surface_points.h"
 #include "pipeline/fields/uniform_field.h"
 #include "pipeline/files/text.h"
+#include "pipeline/program/device_choice.h"
 #include "pipeline/program/memory.h"
+#include "pipeline/run/resolve_settings.h"
+#include "pipeline/stages/splats_of_voxels.h"
 #include "pipeline/stages/styled_field.h"
 #include "pipeline/workspace/style_folders.h"
 
@@ -54,17 +59,60 @@ void ExportPoints(const ExportOptions& options, const std::string& folder,
       Concat("wrote ", to, ": ", Counted(std::ssize(points), "point"), ", approximate"));
 }
 
-void CheckSuits(const std::string& format, const StoredField& stored) {
-  const bool splats = stored.field.geometry->splats.on();
-  if (splats == IsSplatExport(format)) return;
-  throw UsageError(
-      splats ? "is of voxels, and this field has splats"
-             : "is of splats, and this field has voxels",
-      "--format " + format,
-      splats ? "use --format ply, spz, glb or compressed-ply, or fit the scene with --field "
-               "voxels"
-             : "use --format points or svox2, or fit the scene with --field splats");
+void CheckSuits(const std::string& format, bool splats) {
+  if (splats && !IsSplatExport(format))
+    throw UsageError(
+        "is of voxels, and this field has splats", "--format " + format,
+        "use --format ply, spz, glb or compressed-ply, or fit the scene with --field voxels");
 }
+
+RunSettings SettingsOf(const std::string& folder) {
+  RunSettings settings;
+  OptionSet options;
+  settings.Bind(&options);
+  ResolveSettings({.run_json = folder + "/run.json"}, &options);
+  return settings;
+}
+
+// Fits splats to voxels: the geometry once to the scene, and colours to each style.
+class VoxelsAsSplats {
+ public:
+  VoxelsAsSplats(const std::string& folder, const ExportOptions& options,
+                 const StoredField& scene, Console* console)
+      : fit_(ReadCapture(folder + "/poses"), SettingsOf(folder),
+             {.thousands = options.thousands}, ChooseBackend("auto", false)),
+        console_(console) {
+    console->BeginStage("splats");
+    splats_ = fit_.Fit(scene, console->StageProgress());
+    console->EndStage();
+    SayLoss("field", scene, splats_);
+  }
+
+  const StoredField& Scene() const { return splats_; }
+
+  StoredField Style(const std::string& name, const StoredField& styled) {
+    console_->BeginStage("colours");
+    StoredField splats = fit_.Recolor(styled, console_->StageProgress());
+    console_->EndStage();
+    SayLoss(name, styled, splats);
+    return splats;
+  }
+
+ private:
+  void SayLoss(const std::string& name, const StoredField& voxels,
+               const StoredField& splats) const {
+    const double db = PsnrOf(RendersOf(voxels.field, fit_.MeasuredViews(voxels)),
+                             RendersOf(splats.field, fit_.MeasuredViews(splats)));
+    console_->Info(Format("%s: renders of %lld splats are %.1f dB from the voxels' own, on ",
+                          name.c_str(),
+                          static_cast<long long>(splats.field.geometry->num_voxels()), db) +
+                   Counted(kMeasuredNearby, "view") + " that took no part in the fit");
+  }
+
+  SplatsOfVoxels fit_;
+  Console* console_;
+  StoredField splats_;
+};
 
 }  // namespace
 
@@ -89,8 +137,11 @@ void ExportFields(const ExportOptions& options, const std::string& folder, Conso
     return;
   }
   StoredField field = ReadFieldFile(folder + "/field.npz");
-  CheckSuits(options.format, field);
+  const bool splats = field.field.geometry->splats.on();
+  CheckSuits(options.format, splats);
   MakeEmptyFolder(options.out, "");
+  std::optional<VoxelsAsSplats> fitted;
+  if (IsSplatExport(options.format) && !splats) fitted.emplace(folder, options, field, console);
   const auto write = [&](const std::string& name, StoredField stored) {
     if (IsSplatExport(options.format))
       ExportSplats(options, folder, name, stored, console);
@@ -100,10 +151,12 @@ void ExportFields(const ExportOptions& options, const std::string& folder, Conso
       ExportGrid(options, folder, name, std::move(stored), console);
   };
   if (IsSplatExport(options.format)) WriteCamerasAndTransform(options, folder);
-  if (options.names.empty()) write("field", std::move(field));
-  for (const std::string& style : styles)
-    write(style == "field" ? "field-style" : style,
-          ReadStyledField(folder, StyleFolder(folder, style)));
+  if (options.names.empty()) write("field", fitted ? fitted->Scene() : std::move(field));
+  for (const std::string& style : styles) {
+    StoredField styled = ReadStyledField(folder, StyleFolder(folder, style));
+    if (fitted) styled = fitted->Style(style, styled);
+    write(style == "field" ? "field-style" : style, std::move(styled));
+  }
 }
 
 }  // namespace regrade

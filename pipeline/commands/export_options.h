@@ -11,6 +11,7 @@ struct ExportOptions {
   std::string format = "colmap-text";
   std::vector<std::string> names;
   int resolution = 0;
+  float thousands = 500;
   bool dry_run = false;
 
   template <typename Bind>
@@ -22,7 +23,8 @@ struct ExportOptions {
               "and transforms.json for nerfstudio and instant-ngp. ply, spz, glb and "
               "compressed-ply write a scene of splats and each style for viewers, editors and "
               "engines: field.EXT and NAME.EXT, cameras.json, and transform.json, which leads "
-              "back to the photos' world. Of voxels svox2 writes .npz on uniform grids, and "
+              "back to the photos' world; to voxels splats are fitted first. Of voxels svox2 "
+              "writes .npz on uniform grids, and "
               "points PLY files of points with colours, approximately on the surfaces. cube "
               "writes one style as a LUT for photo and video editors, to the file --out",
           .choices = "colmap-text|colmap|transforms|ply|spz|glb|compressed-ply|points|svox2|"
@@ -37,6 +39,11 @@ struct ExportOptions {
                   "finest level of an adaptive one, up to 512; memory grows with its cube",
           .min = 0,
           .max = 1290});
+    bind("splats", thousands,
+         {.unit = "thousands",
+          .help = "most splats that are fitted to voxels",
+          .min = 1,
+          .max = 20000});
     bind("dry-run", dry_run, {.help = "prints what would be written, and does nothing"});
   }
 };
