@@ -22,6 +22,7 @@
 #include "pipeline/run/run_file.h"
 #include "pipeline/run_pipeline.h"
 #include "pipeline/stages/make_stylizer.h"
+#include "pipeline/stages/scene_source.h"
 #include "pipeline/tradeoff/cost_table.h"
 #include "pipeline/tradeoff/duration_estimate.h"
 #include "pipeline/tradeoff/prediction.h"
@@ -325,6 +326,7 @@ void RunTradeoff(const Command& command, const Arguments& arguments, Console* co
   CheckOptions(settings, tradeoff);
   CheckTogether(settings);
   base.source = AbsolutePath(words[0]);
+  SourceOf(base).probe(&base);
   const CaptureSource source = base.Source();
   const bool style = !settings.style.pictures.empty();
   if (style) {

@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include "kernels/render/voxel_renderer.h"
 #include "pipeline/run/presets.h"
 #include "pipeline/run/resolve_settings.h"
 #include "tests/support/psnr.h"
