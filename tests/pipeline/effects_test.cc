@@ -13,6 +13,7 @@
 #include "pipeline/files/json_file.h"
 #include "pipeline/workspace/output_names.h"
 #include "reconstruct/colmap/colmap_model.h"
+#include "tests/support/nightly.h"
 #include "tests/support/synthetic_photos.h"
 #include "tests/support/temporary_folder.h"
 
@@ -193,6 +194,7 @@ TEST(EffectsOn, UndoneExposureGainsThreeDecibels) {
 // The same scene through lenses that bend: followed, they cost no more than half a decibel (the
 // parts of the scene that are seen differ, too), and taken for a pinhole they would cost many.
 TEST(EffectsOn, BentLensesAreAsGoodAsAPinhole) {
+  REGRADE_AT_NIGHT();
   TemporaryFolder folder;
   WriteSyntheticWorkspace(Table(), folder / "pinhole");
   const Reconstruction plain =

@@ -8,6 +8,7 @@
 #include "kernels/image/resize.h"
 #include "pipeline/images/image_file.h"
 #include "pipeline/workspace/style_folders.h"
+#include "tests/support/nightly.h"
 #include "tests/support/source_dir.h"
 #include "tests/support/spawn.h"
 #include "tests/support/temporary_folder.h"
@@ -37,6 +38,7 @@ Vec3d MeanColor(const Image& image, const Image* mask) {
 }
 
 TEST(MatchedStyles, EachRegionTakesItsPictureAndTheStyleIsLikeAnyOther) {
+  REGRADE_AT_NIGHT();
   const TemporaryFolder folder;
   testing::WriteCapture(folder / "s", 6, "96x72");
   const testing::TwoRegions scene = testing::SkyAndGround(6, 96, 72);

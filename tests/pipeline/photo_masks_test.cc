@@ -13,6 +13,7 @@
 #include "pipeline/files/json_file.h"
 #include "pipeline/images/image_file.h"
 #include "pipeline/workspace/output_names.h"
+#include "tests/support/nightly.h"
 #include "tests/support/temporary_folder.h"
 
 namespace regrade {
@@ -94,6 +95,7 @@ std::string Bytes(const std::string& path) {
 }
 
 TEST(PhotoMasks, MaskedPixelsAreNeitherFittedNorMeasured) {
+  REGRADE_AT_NIGHT();
   const TemporaryFolder folder;
   SynthWithAThing(folder);
   Reconstruct(folder / "s/truth", folder / "with", "100,200",

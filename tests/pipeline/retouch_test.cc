@@ -250,6 +250,7 @@ TEST(Vignette, H190_FactorsThatBlackenAPictureAreRefused) {
 }
 
 TEST(Retouch, ALocalEditIsLearnedFromItsPhotoAlone) {
+  REGRADE_AT_NIGHT();
   const TemporaryFolder folder;
   ASSERT_EQ(
       Regrade({"synth", folder / "s", "--views", "6", "--size", "160x120", "--grade", "local"})
