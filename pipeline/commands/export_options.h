@@ -23,7 +23,8 @@ struct ExportOptions {
               "and transforms.json for nerfstudio and instant-ngp. ply, spz, glb and "
               "compressed-ply write a scene of splats and each style for viewers, editors and "
               "engines: field.EXT and NAME.EXT, cameras.json, and transform.json, which leads "
-              "back to the photos' world; to voxels splats are fitted first. Of voxels svox2 "
+              "back to the photos' world; a voxel field becomes splats by a fit first. Of "
+              "voxels svox2 "
               "writes .npz on uniform grids, and "
               "points PLY files of points with colours, approximately on the surfaces. cube "
               "writes one style as a LUT for photo and video editors, to the file --out",

@@ -107,7 +107,7 @@ std::vector<std::string> OptionSet::Parse(const std::vector<std::string>& argume
       flag = {flag.name.substr(std::strlen("no-")), "false"};
     if (const Entry& entry = *Find(flag.name); !IsFlag(entry))
       throw UsageError(
-          "a constant is no flag", "--" + flag.name,
+          "is a constant, not a flag", "--" + flag.name,
           Concat("give --config '", DumpJson(AsConfig(flag.name, flag.value), -1), "'"));
     if (Given(flag.name) && !IsTextList(*Find(flag.name)))
       throw UsageError("given twice", "--" + flag.name, "keep one of them");

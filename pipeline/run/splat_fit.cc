@@ -86,10 +86,9 @@ void CheckSplatSettings(const RunSettings& settings) {
     throw UsageError("the paper's field has voxels", "--field splats and --preset paper",
                      "leave one of them out");
   const auto effects = ParseEffects(settings.run.effects);
-  for (const char* name : {"ndc", "background"})
-    if (const auto effect = effects.find(name); effect != effects.end() && effect->second)
-      throw UsageError("belongs to voxels", Concat("--effects ", name, "=on"),
-                       "leave it out, or use --field voxels");
+  if (const auto ndc = effects.find("ndc"); ndc != effects.end() && ndc->second)
+    throw UsageError("belongs to voxels", "--effects ndc=on",
+                     "leave it out, or use --field voxels");
 }
 
 StagePlan PlanSplats(const RunSettings& settings, const FitPlace& place) {

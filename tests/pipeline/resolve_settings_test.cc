@@ -154,6 +154,10 @@ TEST(ResolveSettings, FlagsOfTheOtherKindOfFieldAreRefused) {
                        "--field splats");
   EXPECT_EQ(Resolve({"--field", "voxels", "--fit-steps", "10"}).settings.fit.steps,
             std::vector<int>{10});
+  // Splats have far surroundings, and no device coordinates.
+  CheckTogether(Resolve({"--effects", "background=on"}).settings);
+  EXPECT_REGRADE_ERROR(CheckTogether(Resolve({"--effects", "ndc=on"}).settings),
+                       ExitCode::kUsage, "--field voxels");
   const TemporaryFolder folder;
   const std::string run = folder / "run.json";
   WriteText(run, R"({"arguments": ["/photos"], "options": {"preset": "draft"}})");

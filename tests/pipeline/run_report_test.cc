@@ -67,10 +67,21 @@ TEST(RunReport, ShowsEveryPartOfTheRun) {
   const TemporaryFolder folder;
   const std::string style = testing::SourceDir() + "/assets/style_sunset.png";
   testing::WriteCapture(folder / "s", 6, "96x72");
-  std::vector<std::string> run{"run",       folder / "s/truth", "--style",  style,
-                               "--out",     folder / "e",       "--preset", "draft",
-                               "--effects", "exposure=off",     "--device", "cpu",
-                               "--verbose"};
+  std::vector<std::string> run{"run",
+                               folder / "s/truth",
+                               "--style",
+                               style,
+                               "--out",
+                               folder / "e",
+                               "--preset",
+                               "draft",
+                               "--effects",
+                               "exposure=off",
+                               "--device",
+                               "cpu",
+                               "--verbose",
+                               "--config",
+                               R"({"style-rays": 512})"};
   for (const std::string& flag : testing::TinyFlags("voxels")) run.push_back(flag);
   const testing::ProgramOutcome done = Regrade(run);
   ASSERT_EQ(done.code, 0) << done.text;
