@@ -35,7 +35,7 @@ struct SplatGeometry {
   Buffer<float> mean, log_scale;  // [N, 3]
   Buffer<float> quaternion;       // [N, 4]
   Buffer<float> opacity_logit;    // [N]
-  bool antialiased = false;       // see SplatOptions
+  float fit_pixel = -1;           // see SplatOptions
 
   bool on() const { return opacity_logit.size() > 0; }
 };

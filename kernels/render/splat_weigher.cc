@@ -67,7 +67,8 @@ int64_t SplatWeigher::TileLists::bytes() const {
 SplatWeigher::SplatWeigher(const Geometry& geometry, float near_clip, float min_weight,
                            int64_t kept_bytes)
     : splats_(SplatsWithoutColors(geometry.splats)),
-      options_(SplatOptionsFor(near_clip, geometry.frame.radius, geometry.splats.antialiased)),
+      options_(
+          SplatOptionsFor(near_clip, geometry.frame.radius, double{geometry.splats.fit_pixel})),
       min_weight_(min_weight),
       left_bytes_(kept_bytes) {}
 

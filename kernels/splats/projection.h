@@ -3,7 +3,7 @@
 // EQ(splat-projection), Zwicker et al. 2001 as in Kerbl et al. 2023, eq. 5: with p = (x, y, z)
 // the mean in camera coordinates and W the camera's rotation,
 //   (u, v) = (fx x / z + cx, fy y / z + cy),   S = J W Sigma W^T J^T + s I,
-//   J = [fx / z, 0, -fx t_x / z;  0, fy / z, -fy t_y / z],   s = `blur`,
+//   J = [fx / z, 0, -fx t_x / z;  0, fy / z, -fy t_y / z],   s = `blur`, see EQ(splat-filter),
 // t_x and t_y being x / z and y / z, limited to 1.3 times half the picture's extent from its
 // middle: W / 2 - cx +- 1.3 W / 2 over fx, and so for y. Where the limit holds, t is constant.
 // Splats with z below the near plane, or whose mean is more than kMaxOffset pixels off, are
@@ -18,16 +18,19 @@
 // columns of W R and t = (t_x, t_y, 1), n_k = s_i s_j fx fy / z^2 t.v_k for (i, j, k) cyclic.
 // A pixel at d from the mean has q = d^T S^-1 d = |w|^2 with C w = d.
 //
-// EQ(splat-filter), Yu et al. 2024 (the 2D Mip filter of Mip-Splatting) with sigmoid(logit) as
-// opacity: times rho = sqrt(det(A A^T) / det S) = |n| / (c00 c11), which is never a root of a
-// negative number.
+// EQ(splat-filter): a fit sees its splats with their blur, which belongs to them. In a picture
+// with r times the pixels for an angle that is e = r^2 `blur`; where it is below one pixel's,
+// opacity times rho = sqrt(det(A A^T + e I) / det S) makes up for the rest:
+//   s = max(1, r^2) `blur`,   det(A A^T + e I) = |n|^2 + e (|a_0|^2 + |a_1|^2) + e^2,
+// which is no difference. With r = 0 it is the 2D Mip filter of Yu et al. 2024
+// (Mip-Splatting) with sigmoid(logit) as opacity: rho = |n| / (c00 c11).
 //
 // EQ(splat-projection-adjoint): pixels enter by sums of numbers of size 1. With g a pixel's
 // gradient by ln alpha, h = sum g w, H = sum g w w^T, f = sum g, and the rows b of
 //   B = C^-1 A:  b_0 = a_0 / c00,  b_1 = s a_1 / (c00^2 c11) + n / (c00 c11) x b_0
 // (entries at most 1; a_1 - c10 b_0 would cancel), for the logarithms l of the scales
 //   d_(u, v) = C^-T h,   d_A = C^-T H B,   d_l = diag(B^T H B),
-// and for rho (see EQ(splat-filter); d ln|n| = sum_k (n_k / |n|^2) d n_k)
+// and for rho with r = 0 (see EQ(splat-filter); d ln|n| = sum_k (n_k / |n|^2) d n_k)
 //   d_A += f (d ln|n| / dA - C^-T B),   d_l_k += f (1 - n_k^2 / |n|^2 - |column k of B|^2).
 #pragma once
 
@@ -73,6 +76,17 @@ struct ScreenEllipse {
     w[1] = (dy - c10 * w[0]) / c11;
   }
 };
+
+// See EQ(splat-filter), pixels^2.
+struct SplatBlur {
+  double added = 0, fitted = 0;  // s, e
+};
+
+HD inline SplatBlur BlurOf(const SplatCamera& camera, const SplatOptions& options) {
+  if (options.fit_pixel < 0) return {options.blur, options.blur};
+  const double r2 = camera.fx * options.fit_pixel * (camera.fy * options.fit_pixel);
+  return {options.blur * (r2 > 1 ? r2 : 1), options.blur * r2};
+}
 
 // EQ(splat-projection) with what its adjoint needs.
 template <typename T>
@@ -122,7 +136,8 @@ HD bool ProjectSplat(const SplatCamera& camera, const SplatOptions& options,
   if (!ProjectMean(camera, options, splat.mean, p)) return false;
   const Mat3<T> rotation = camera.rotation.Cast<T>() * RotationOf(splat.quaternion);
   p->scale = ScalesOf(splat.log_scale);
-  const T root = sqrt(static_cast<T>(options.blur));
+  const SplatBlur blur = BlurOf(camera, options);
+  const T root = sqrt(static_cast<T>(blur.added));
   Vec3<T> a[2];
   T most = root;
   for (int k = 0; k < 3; ++k) {
@@ -147,7 +162,13 @@ HD bool ProjectSplat(const SplatCamera& camera, const SplatOptions& options,
   p->area = n * (most / e->c00) * (most / e->c11);
   p->area_by_slope = p->area_by_slope * (most / e->c00) * (most / e->c11);
   p->b[1] = (a[1] / e->c00) * ((root / e->c00) * (root / e->c11)) + Cross(p->area, p->b[0]);
-  e->filter = options.antialiased ? ScaledNorm(p->area) : T(1);
+  e->filter = 1;
+  if (blur.fitted < blur.added) {
+    const T part = sqrt(static_cast<T>(blur.fitted));
+    const Vec3<T> sides = {ScaledNorm(a[0]) / e->c11, ScaledNorm(a[1]) / e->c11, part / e->c11};
+    e->filter =
+        ScaledNorm(Vec3<T>{ScaledNorm(p->area), part / e->c00 * ScaledNorm(sides), T(0)});
+  }
   return true;
 }
 
@@ -158,14 +179,15 @@ struct EllipseSums {
   T f = 0;           // sum g
 };
 
-// Adds the gradient to d; d_depth: of z.
+// Adds the gradient to d; d_depth: of z. In pictures smaller than the fit's the filter counts
+// as constant.
 template <typename T>
 HD void ProjectSplatAdjoint(const SplatCamera& camera, const SplatOptions& options,
                             const Splat<T>& splat, const SplatProjection<T>& p,
                             const EllipseSums<T>& sums, T d_depth, Splat<T>* d) {
   const ScreenEllipse<T>& e = p.ellipse;
   const T z = static_cast<T>(p.at.z);
-  const T f = options.antialiased ? sums.f : T(0);
+  const T f = options.fit_pixel == 0 ? sums.f : T(0);
   const Vec3<T> r0 = p.b[0] * (sums.H[0] - f) + p.b[1] * sums.H[1];
   const Vec3<T> r1 = p.b[0] * sums.H[1] + p.b[1] * (sums.H[2] - f);
   // C^-T (r0, r1) is d_A; the gradient by J W R is that times the scales.

@@ -36,9 +36,12 @@ struct SplatDropout {
 };
 
 struct SplatOptions {
-  double near_plane = 0.2;   // world units, > 0: splats whose mean is nearer are left out
-  double blur = 0.3;         // pixels^2, > 0: added to the variance along both image axes
-  bool antialiased = false;  // opacity is lowered by what the blur adds, see EQ(splat-filter)
+  double near_plane = 0.2;  // world units, > 0: splats whose mean is nearer are left out
+  double blur = 0.3;        // pixels^2, > 0: added to the variance along both image axes
+  // Of the pictures that the splats were fitted to, the tangent of a pixel's angle (1 / focal
+  // length in pixels), see EQ(splat-filter). 0: they were fitted with that filter; below 0: not
+  // known, taken as this picture's.
+  double fit_pixel = -1;
   SplatDropout dropout;
 };
 

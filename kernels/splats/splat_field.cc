@@ -31,11 +31,11 @@ Buffer<float> UnitQuaternions(const std::vector<float>& quaternion) {
 
 }  // namespace
 
-SplatOptions SplatOptionsFor(float near_clip, const Vec3f& radius, bool antialiased) {
+SplatOptions SplatOptionsFor(float near_clip, const Vec3f& radius, double fit_pixel) {
   SplatOptions options;
   const double longest = std::max({radius.x, radius.y, radius.z});
   options.near_plane = std::max(0.5 * static_cast<double>(near_clip), 1e-3 * longest);
-  options.antialiased = antialiased;
+  options.fit_pixel = fit_pixel;
   return options;
 }
 
@@ -61,16 +61,16 @@ SplatsView<float> SplatsOf(const RadianceField& field) {
 
 SplatOptions SplatOptionsOf(const RadianceField& field) {
   return SplatOptionsFor(field.near_clip, field.geometry->frame.radius,
-                         field.geometry->splats.antialiased);
+                         double{field.geometry->splats.fit_pixel});
 }
 
 RadianceField FieldOfSplats(const Splats& splats, const GridFrame& frame, float near_clip,
-                            bool antialiased) {
+                            float fit_pixel) {
   auto geometry = std::make_shared<Geometry>();
   geometry->frame = frame;
   geometry->splats = {ToBuffer(splats.mean), ToBuffer(splats.log_scale),
                       UnitQuaternions(splats.quaternion), ToBuffer(splats.opacity_logit),
-                      antialiased};
+                      fit_pixel};
   RadianceField field;
   field.geometry = std::move(geometry);
   field.appearance.basis = splats.basis;

@@ -39,7 +39,7 @@ const SplatExport* FindExport(const std::string& format) {
 
 void WriteSplats(const std::string& format, const std::string& path,
                  const StoredField& stored) {
-  const bool antialiased = stored.field.geometry->splats.antialiased;
+  const bool antialiased = stored.field.geometry->splats.fit_pixel == 0;
   if (format == "ply")
     WriteSplatPly(path, stored, kComment);
   else if (format == "spz")
@@ -56,7 +56,7 @@ RadianceField ReadBack(const std::string& path, const StoredField& stored) {
   MoveSplats(stored.field_from_world, &scene.splats);
   scene.splats.background = stored.field.background;
   return FieldOfSplats(scene.splats, stored.field.geometry->frame, stored.field.near_clip,
-                       scene.antialiased);
+                       scene.antialiased ? 0.0f : -1.0f);
 }
 
 }  // namespace

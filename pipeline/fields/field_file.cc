@@ -1,6 +1,7 @@
 #include "pipeline/fields/field_file.h"
 
 #include <algorithm>
+#include <cmath>
 #include <optional>
 #include <utility>
 #include <vector>
@@ -187,7 +188,7 @@ void AddSplats(const Geometry& geometry, MadeArrays* made, NpzWriter* file) {
   file->Add("regrade_splats_log_scale", {n, 3}, made->log_scale.data());
   file->Add("regrade_splats_quaternion", {n, 4}, made->quaternion.data());
   file->Add("regrade_splats_opacity_logit", {n}, made->opacity_logit.data());
-  file->AddScalar<int32_t>("regrade_splats_antialiased", splats.antialiased);
+  file->AddScalar("regrade_splats_fit_pixel", splats.fit_pixel);
 }
 
 Buffer<float> ReadHalves(NpzReader* file, const std::string& name,
@@ -208,7 +209,9 @@ Rows ReadSplats(NpzReader* file, Geometry* geometry) {
   splats->log_scale = ReadHalves(file, "regrade_splats_log_scale", {n, 3});
   splats->quaternion = ReadHalves(file, "regrade_splats_quaternion", {n, 4});
   splats->opacity_logit = ReadHalves(file, "regrade_splats_opacity_logit", {n});
-  splats->antialiased = file->ReadScalar<int32_t>("regrade_splats_antialiased") != 0;
+  splats->fit_pixel = file->ReadScalar<float>("regrade_splats_fit_pixel");
+  if (!std::isfinite(splats->fit_pixel))
+    Refuse(file->path(), "regrade_splats_fit_pixel is not a number");
   return {n, Concat("there are ", n, " splats")};
 }
 

@@ -19,7 +19,7 @@
 //
 // A field of splats has neither links nor cells nor density_data: in their place are
 // regrade_splats_mean f32[N,3], regrade_splats_log_scale f16[N,3], regrade_splats_quaternion
-// f16[N,4] (unit length), regrade_splats_opacity_logit f16[N] and regrade_splats_antialiased
+// f16[N,4] (unit length), regrade_splats_opacity_logit f16[N] and regrade_splats_fit_pixel
 // i32, see SplatGeometry; radius and center are those of the box that the cameras look at.
 #pragma once
 

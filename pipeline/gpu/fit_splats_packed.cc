@@ -93,7 +93,7 @@ void FitSplatsPacked(const FitSplatsOptions& settings, const SplatFitOptions& fi
   const SceneBox& box = capture.scene.box;
   if (!settings.out.empty())
     WriteFieldFile(settings.out, {FieldOfSplats(result.splats, {{}, box.center, box.radius},
-                                                box.near_clip, options.antialiased),
+                                                box.near_clip, result.fit_pixel),
                                   capture.scene.field_from_world,
                                   {}});
   JsonValue::Array curve;

@@ -123,7 +123,7 @@ PageField EncodeSplats(const RadianceField& any, double step) {
       {"step", double{field.step}},
       {"color", JsonOf(code)},
       {"splats", JsonValue::Object{{"coarse", order.coarse},
-                                   {"antialiased", options.antialiased},
+                                   {"fit_pixel", options.fit_pixel},
                                    {"near_plane", options.near_plane},
                                    {"blur", options.blur},
                                    {"position_step", kPositionStep},
@@ -164,7 +164,7 @@ RadianceField DecodeSplats(const PageField& page) {
   splats.log_scale.Resize(3 * count);
   splats.quaternion.Resize(4 * count);
   splats.opacity_logit.Resize(count);
-  splats.antialiased = header.At("splats").At("antialiased").AsBool();
+  splats.fit_pixel = static_cast<float>(header.At("splats").At("fit_pixel").AsDouble());
   field.appearance.sh.Resize(count * field.appearance.stride());
   for (size_t i = 0; i < parts.size(); ++i) {
     PutSplats(shapes[i], parts[i], geometry.get());

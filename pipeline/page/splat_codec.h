@@ -5,8 +5,9 @@
 // voxels, see EQ(page-color-code). Numbers are packed as EQ(page-prediction) says, those of
 // each section by themselves.
 //
-// In the header "splats" has how many come first ("coarse"), whether they are "antialiased",
-// the "near_plane" and the "blur" of their pictures, and the steps of the numbers.
+// In the header "splats" has how many come first ("coarse"), the "fit_pixel" (see
+// SplatOptions), the "near_plane" and the "blur" of their pictures, and the steps of the
+// numbers.
 #pragma once
 
 #include <vector>

@@ -53,12 +53,11 @@ class SplatFit : public FieldFit {
     hooks.resume = resume_ ? &*resume_ : nullptr;
     const SplatFitResult fit = FitSplats(views, place_.box, options_, hooks, place_.backend);
     const GridFrame box{{}, place_.box.center, place_.box.radius};
-    FittedField fitted{
-        FieldOfSplats(fit.splats, box, place_.box.near_clip, options_.antialiased),
-        fit.psnr_train_db,
-        {},
-        fit.pixels,
-        fit.rejected};
+    FittedField fitted{FieldOfSplats(fit.splats, box, place_.box.near_clip, fit.fit_pixel),
+                       fit.psnr_train_db,
+                       {},
+                       fit.pixels,
+                       fit.rejected};
     for (const SplatCurvePoint& point : fit.curve)
       if (std::isfinite(point.psnr_train_db))
         fitted.psnr_at_steps.emplace_back(point.step, RoundedForChart(point.psnr_train_db));

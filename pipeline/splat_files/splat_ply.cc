@@ -32,8 +32,9 @@ void WriteSplatPly(const std::string& path, const StoredField& stored,
   static_assert(std::endian::native == std::endian::little);
   const Splats splats = WorldSplats(stored);
   const size_t basis = static_cast<size_t>(splats.basis);
-  std::string bytes = Header(splats.count(), splats.basis,
-                             CommentLines(comment, stored.field.geometry->splats.antialiased));
+  std::string bytes =
+      Header(splats.count(), splats.basis,
+             CommentLines(comment, stored.field.geometry->splats.fit_pixel == 0));
   std::vector<float> row;
   for (int64_t i = 0; i < splats.count(); ++i) {
     const Splat<float> splat = splats.view()[i];

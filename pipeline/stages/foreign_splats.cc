@@ -57,7 +57,7 @@ RadianceField FieldInItsWorld(const SplatScene& scene) {
   const auto radius = static_cast<float>(extent.radius);
   return FieldOfSplats(scene.splats,
                        {{}, extent.center.Cast<float>(), {radius, radius, radius}}, 0,
-                       scene.antialiased);
+                       scene.antialiased ? 0.0f : -1.0f);
 }
 
 }  // namespace regrade

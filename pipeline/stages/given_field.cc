@@ -53,7 +53,7 @@ StageOutcome ReadGivenField(RunContext* context, const ProgressFunction& progres
     // Freed once it is written: what is measured is the file.
     const StoredField stored{
         FieldOfSplats(file.splats, {{}, scene.box.center, scene.box.radius},
-                      scene.box.near_clip, file.antialiased),
+                      scene.box.near_clip, file.antialiased ? 0.0f : -1.0f),
         scene.field_from_world,
         {}};
     file = {};

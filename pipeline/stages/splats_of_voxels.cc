@@ -131,7 +131,7 @@ StoredField SplatsOfVoxels::FitTo(const StoredField& voxels, const SplatFitOptio
   }
   SplatFitResult fitted = FitSplats(training, box, fit, hooks, backend_);
   *splats = std::move(fitted.splats);
-  return {FieldOfSplats(*splats, {{}, box.center, box.radius}, box.near_clip, fit.antialiased),
+  return {FieldOfSplats(*splats, {{}, box.center, box.radius}, box.near_clip, fitted.fit_pixel),
           scene_.field_from_world,
           {}};
 }

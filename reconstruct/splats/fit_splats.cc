@@ -28,7 +28,7 @@ class SplatFitter {
   SplatFitter(const std::vector<TrainingView>& views, const SceneBox& box,
               const SplatFitOptions& options, const SplatFitHooks& hooks, Backend backend)
       : views_(views), box_(box), options_(options), hooks_(hooks), photos_(views) {
-    const SplatOptions render = SplatOptionsFor(box.near_clip, box.radius, options.antialiased);
+    const SplatOptions render = SplatOptionsFor(box.near_clip, box.radius, -1);
     engine_ =
         backend == Backend::kCuda ? MakeCudaSplatEngine(render) : MakeCpuSplatEngine(render);
     const CameraSpread cameras = SpreadOf(photos_, box);
@@ -74,6 +74,7 @@ class SplatFitter {
     result.seconds = ClockSeconds() - start_ - idle_;
     Measure();
     engine_->ReadState([&](SplatFitState* end) { result.splats = end->splats; });
+    result.fit_pixel = photos_.pixel();
     result.psnr_train_db = Psnr(tally_.tail_error, tally_.tail_values);
     result.pixels = tally_.pixels;
     result.rejected = tally_.rejected;
@@ -83,9 +84,9 @@ class SplatFitter {
   }
 
  private:
-  int At(float part) const {
-    return static_cast<int>(std::lround(part * static_cast<float>(options_.steps)));
-  }
+  float Steps() const { return static_cast<float>(options_.steps); }
+  int At(float part) const { return static_cast<int>(std::lround(part * Steps())); }
+  bool is_long() const { return options_.steps >= options_.long_from; }
 
   // Half the photos' size at first.
   void ChoosePhotos() {
@@ -121,12 +122,11 @@ class SplatFitter {
     step.photo = PhotoOfStep();
     step.ssim_weight = options_.ssim_weight;
     SplatUpdate& update = step.update;
-    const float part = static_cast<float>(step_) / static_cast<float>(options_.steps);
+    const float part = static_cast<float>(step_) / Steps();
     const float rate = options_.rate_mean *
                        std::pow(options_.rate_mean_end / options_.rate_mean, part) * extent_;
-    const bool is_long = options_.steps >= options_.long_from;
     const float fall =
-        is_long ? std::pow(options_.fall, std::max(0.0f, 2 * part - 1)) : 1.0f;  // of rates
+        is_long() ? std::pow(options_.fall, std::max(0.0f, 2 * part - 1)) : 1.0f;  // of rates
     update.rates = {rate,
                     options_.rate_scale * fall,
                     options_.rate_quaternion * fall,
@@ -136,7 +136,7 @@ class SplatFitter {
                     middle_,
                     extent_};
     update.noise = options_.noise * rate;
-    if (is_long)
+    if (is_long())
       step.dropout =
           SplatDropout(options_.dropout * part, options_.seed, static_cast<uint64_t>(step_));
     const float splats = static_cast<float>(engine_->count());
@@ -149,9 +149,17 @@ class SplatFitter {
     if (step_ % kWindow == 0) CloseWindow();
   }
 
-  // Moves dead splats and adds new ones, every `grow_each`.
-  void Populate() {
+  int StepsBetweenChanges() const {
     const int each = std::max(1, At(options_.grow_each));
+    if (!is_long()) return each;
+    const int seen =
+        static_cast<int>(options_.grow_rounds * static_cast<float>(photos_.count()));
+    return std::max(each, std::min(seen, At(options_.grow_each_most)));
+  }
+
+  // Moves dead splats and adds new ones.
+  void Populate() {
+    const int each = StepsBetweenChanges();
     if (step_ % each != 0 || step_ < At(options_.grow_from) || step_ == 0 ||
         step_ >= At(options_.grow_until))
       return;
@@ -160,9 +168,12 @@ class SplatFitter {
     const PopulationChange moved = MoveDead(logits, options_.seed, number);
     if (!moved.copies.empty()) engine_->Change(moved);
     const int64_t now = engine_->count();
-    const int64_t more =
-        std::min(most_, static_cast<int64_t>((1 + options_.growth) * static_cast<float>(now))) -
-        now;
+    const float growth =
+        std::pow(1 + options_.growth,
+                 static_cast<float>(each) / std::max(1.0f, options_.grow_each * Steps()));
+    const int64_t more = std::min(most_, static_cast<int64_t>(std::min(growth, 2.0f) *
+                                                              static_cast<float>(now))) -
+                         now;
     if (more <= 0) return;
     for (const CopiedSplat& copied : moved.copied)
       logits[static_cast<size_t>(copied.index)] = copied.opacity_logit;

@@ -42,6 +42,7 @@ struct SplatFitResult {
   double psnr_train_db = 0;
   int64_t pixels = 0;  // compared, over all steps
   int64_t rejected = 0;
+  float fit_pixel = -1;         // see SplatOptions; below 0 if the photos' differ
   double entries_per_step = 0;  // splats in tiles, which work grows with
   double seconds = 0;           // of this call, without checkpoints
   std::vector<SplatCurvePoint> curve;

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "kernels/base/error.h"
 #include "kernels/image/resize.h"
@@ -51,6 +52,17 @@ int64_t SplatPhotos::num_pixels() const {
   for (const SplatPhoto& photo : photos_)
     pixels += int64_t{photo.camera.width} * photo.camera.height;
   return pixels;
+}
+
+float SplatPhotos::pixel() const {
+  constexpr double kAlike = 1.05;
+  double least = std::numeric_limits<double>::infinity(), most = 0;
+  for (const SplatPhoto& photo : photos_) {
+    const double focal = std::sqrt(photo.camera.fx * photo.camera.fy);
+    least = std::min(least, focal);
+    most = std::max(most, focal);
+  }
+  return most <= kAlike * least ? static_cast<float>(1 / std::sqrt(least * most)) : -1.0f;
 }
 
 Vec3f SplatPhotos::mean_color() const {

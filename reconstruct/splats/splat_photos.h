@@ -28,6 +28,8 @@ class SplatPhotos {
   const SplatPhoto& operator[](int i) const { return photos_[static_cast<size_t>(i)]; }
   int64_t num_pixels() const;
   Vec3f mean_color() const;  // sRGB, of all pixels that are not masked
+  // Tangent of the angle of a pixel; below 0 if the focal lengths differ by more than 5 %.
+  float pixel() const;
 
  private:
   std::vector<SplatPhoto> photos_;

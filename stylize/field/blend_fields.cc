@@ -65,7 +65,7 @@ bool SameGeometry(const Geometry& a, const Geometry& b) {
          same(a.splats.mean, b.splats.mean) && same(a.splats.log_scale, b.splats.log_scale) &&
          same(a.splats.quaternion, b.splats.quaternion) &&
          same(a.splats.opacity_logit, b.splats.opacity_logit) &&
-         a.splats.antialiased == b.splats.antialiased && a.spheres.layers == b.spheres.layers &&
+         a.splats.fit_pixel == b.splats.fit_pixel && a.spheres.layers == b.spheres.layers &&
          same(a.spheres.links, b.spheres.links) && same(a.spheres.density, b.spheres.density);
 }
 

@@ -58,8 +58,8 @@ std::vector<std::string> FieldSeeds() {
         seed == 0 ? RandomCellField({1, 2, 1}, 2, 1, 3) : RandomField({5, 4, 6}, 4, 0.5, 1);
     if (seed == 2) AddSpheres(3, 4, 0.6, 2, &field);
     if (seed == 3)
-      field = FieldOfSplats(CastSplats<float>(RandomSplats(20, 4, 1)), {{}, {}, {1, 1, 1}}, 0,
-                            false);
+      field =
+          FieldOfSplats(CastSplats<float>(RandomSplats(20, 4, 1)), {{}, {}, {1, 1, 1}}, 0, -1);
     const PageField page = EncodeField(field, 0.1);
     Parts parts{DumpJson(page.header, -1), {}};
     for (const PageSection& section : page.sections)

@@ -114,7 +114,7 @@ TEST_F(DeviceSplatsTest, RendersAsTheCpu) {
     for (const auto& [width, height] : {std::pair{75, 50}, {8, 8}, {1, 3}, {131, 97}})
       for (const bool antialiased : {false, true}) {
         SplatOptions options;
-        options.antialiased = antialiased;
+        options.fit_pixel = antialiased ? 0 : -1;
         const Camera camera = SplatCameraOf(width, height);
         const auto exact = RenderSplats(MakeSplatFrame(scene.splats.view(), camera, options));
         device.Upload(scene.splats);
@@ -151,7 +151,7 @@ TEST_F(DeviceSplatsTest, GradientsAsOnTheCpu) {
       for (const bool antialiased : {false, true})
         for (const bool depth : {true, false}) {
           SplatOptions options;
-          options.antialiased = antialiased;
+          options.fit_pixel = antialiased ? 0 : -1;
           const Camera camera = SplatCameraOf(width, height);
           SplatPicture<float> d = RandomGradient(camera);
           if (!depth) std::fill(d.depth.begin(), d.depth.end(), 0.0f);
@@ -262,7 +262,7 @@ TEST_F(DeviceSplatsTest, AnyRunGivesTheSameBits) {
 TEST_F(DeviceSplatsTest, AFieldAndItsStyleAreRenderedAsOnTheHost) {
   const GridFrame box{{}, {0, 0, 0}, {1, 1, 1}};
   const RadianceField field =
-      FieldOfSplats(CastSplats<float>(RandomSplats(400, 9, 104)), box, 0.1f, false);
+      FieldOfSplats(CastSplats<float>(RandomSplats(400, 9, 104)), box, 0.1f, -1);
   RadianceField styled = field;
   for (int64_t i = 0; i < styled.appearance.sh.size(); ++i) styled.appearance.sh[i] *= -0.5f;
   const Camera camera = SplatCameraOf(75, 50);
@@ -288,7 +288,8 @@ TEST_F(DeviceSplatsTest, RaysSeeWhatTheySeeOnTheCpu) {
   for (const Scene& scene : Scenes())
     for (const bool antialiased : {false, true}) {
       if (scene.splats.count() == 0 || scene.name == "one depth") continue;
-      const RadianceField field = FieldOfSplats(scene.splats, box, 0.2f, antialiased);
+      const RadianceField field =
+          FieldOfSplats(scene.splats, box, 0.2f, antialiased ? 0.0f : -1.0f);
       const ViewRays pixels = testing::PixelsOf(
           {SplatCameraOf(75, 50), SplatCameraOf(8, 8), SplatCameraOf(131, 97)});
       const RayWeights exact =
@@ -325,7 +326,7 @@ TEST_F(DeviceSplatsTest, RaysSeeWhatTheySeeOnTheCpu) {
 // Cameras that come again, whose lists were kept or not; rays in another order and in groups.
 TEST_F(DeviceSplatsTest, WeightsDoNotDependOnMemoryOrGroups) {
   const RadianceField field = FieldOfSplats(CastSplats<float>(RandomSplats(3000, 4, 105)),
-                                            {{}, {0, 0, 0}, {1, 1, 1}}, 0.2f, false);
+                                            {{}, {0, 0, 0}, {1, 1, 1}}, 0.2f, -1);
   const ViewRays pixels =
       testing::PixelsOf({SplatCameraOf(75, 50), SplatCameraOf(40, 30), SplatCameraOf(131, 97)});
   std::vector<RayWeights> all;

@@ -25,7 +25,7 @@ class FastSplats : public ::testing::TestWithParam<std::tuple<const char*, bool>
   void SetUp() override {
     if (functions() == nullptr)
       GTEST_SKIP() << "this processor lacks " << std::get<0>(GetParam());
-    options_.antialiased = std::get<1>(GetParam());
+    options_.fit_pixel = std::get<1>(GetParam()) ? 0 : -1;
   }
   const SplatTileFunctions* functions() const { return SplatTilesFor(std::get<0>(GetParam())); }
   SplatOptions options_;

@@ -51,7 +51,7 @@ TEST_P(SplatGradient, AdjointEqualsDerivativeInDouble) {
   const auto [basis, antialiased, dropout] = GetParam();
   const Camera camera = SplatCameraOf(13, 10);
   SplatOptions options;
-  options.antialiased = antialiased;
+  options.fit_pixel = antialiased ? 0 : -1;
   options.dropout = SplatDropout(dropout, 3, 4);
   const SplatPicture<double> d = RandomAdjoint<double>(camera);
   int checked = 0, not_zero = 0, all = 0, limited = 0;
@@ -209,7 +209,7 @@ TEST(SplatGradientInFloat, AgreesWithDouble) {
   const Camera camera = SplatCameraOf(40, 30);
   for (const bool antialiased : {false, true}) {
     SplatOptions options;
-    options.antialiased = antialiased;
+    options.fit_pixel = antialiased ? 0 : -1;
     const SplatArrays<double> splats = RoundedToFloat(RandomSplats(300, 16, 41));
     const SplatArrays<double> exact =
         RenderSplatsPlainAdjoint(splats.view(), camera, options, RandomAdjoint<double>(camera));
@@ -226,7 +226,7 @@ TEST(SplatGradientInFloat, NeedlesKeepTheirDigits) {
   const Camera camera = SplatCameraOf(40, 30);
   for (const bool antialiased : {false, true}) {
     SplatOptions options;
-    options.antialiased = antialiased;
+    options.fit_pixel = antialiased ? 0 : -1;
     SplatArrays<double> splats = RandomSplats(60, 4, 43);
     for (size_t i = 0; i < 60; ++i) {
       splats.opacity_logit[i] = 3;

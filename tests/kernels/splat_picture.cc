@@ -2,7 +2,7 @@
 //
 //   splat_picture < SCENE > PICTURE
 //
-// SCENE is doubles: width, height, basis, count, antialiased, near plane, blur, fx, fy, cx, cy,
+// SCENE is doubles: width, height, basis, count, fit pixel, near plane, blur, fx, fy, cx, cy,
 // camera_from_world (rotation by rows, translation), background [3], and the arrays of
 // SplatArrays in order. PICTURE is the arrays of SplatPicture.
 #include <cstdio>
@@ -28,7 +28,7 @@ int Run() {
   camera.fx = head[7], camera.fy = head[8], camera.cx = head[9], camera.cy = head[10];
   for (int i = 0; i < 9; ++i) camera.camera_from_world.rotation(i / 3, i % 3) = head[11 + i];
   camera.camera_from_world.translation = {head[20], head[21], head[22]};
-  const SplatOptions options{head[5], head[6], head[4] != 0};
+  const SplatOptions options{head[5], head[6], head[4]};
   SplatArrays<double> splats(static_cast<int64_t>(head[3]), static_cast<int>(head[2]));
   splats.background = {head[23], head[24], head[25]};
   for (std::vector<double>* values :

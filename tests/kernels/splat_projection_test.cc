@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <vector>
 
 #include "kernels/splats/compositing.h"
@@ -92,7 +93,7 @@ TEST(SplatRotation, AdjointEqualsDerivativeInDouble) {
 
 // S by its definition, all products formed, in long double.
 struct Exact {
-  long double xx, xy, yy, without;  // S, and det(A A^T)
+  long double xx, xy, yy, fitted;  // S, and det(A A^T + e I)
 };
 Exact ByDefinition(const Camera& camera, const SplatOptions& options,
                    const Splat<double>& splat) {
@@ -123,39 +124,46 @@ Exact ByDefinition(const Camera& camera, const SplatOptions& options,
     for (int b = 0; b < 2; ++b)
       for (int k = 0; k < 3; ++k)
         for (int l = 0; l < 3; ++l) s[a][b] += j[a][k] * turned[k][l] * j[b][l];
-  return {s[0][0] + options.blur, s[0][1], s[1][1] + options.blur,
-          s[0][0] * s[1][1] - s[0][1] * s[0][1]};
+  const long double ratio = camera.fx * (long double)options.fit_pixel,
+                    e = options.blur * ratio * camera.fy * options.fit_pixel,
+                    blur = std::max((long double)options.blur, e);
+  return {s[0][0] + blur, s[0][1], s[1][1] + blur,
+          (s[0][0] + e) * (s[1][1] + e) - s[0][1] * s[0][1]};
 }
 
 TEST(SplatProjection, IsTheDefinitionsEllipse) {
   const Camera camera = SplatCameraOf(60, 40);
   SplatOptions options;
-  options.antialiased = true;
   const SplatArrays<double> splats = RandomSplats(300, 1, 64, 2.5);
   int limited = 0;
-  for (int64_t i = 0; i < splats.count(); ++i) {
-    const Splat<double> splat = splats.view()[i];
-    SplatProjection<double> p;
-    if (!ProjectSplat(SplatCamera(camera), options, splat, &p)) continue;
-    limited += p.limited[0] || p.limited[1];
-    double u, v, z;
-    ASSERT_TRUE(camera.Project(splat.mean, &u, &v, &z));
-    EXPECT_NEAR(p.ellipse.u, u, 1e-12 * (1 + std::abs(u)));
-    EXPECT_NEAR(p.ellipse.v, v, 1e-12 * (1 + std::abs(v)));
-    EXPECT_NEAR(p.at.z, z, 1e-15 * z);
-    const Exact exact = ByDefinition(camera, options, splat);
-    const ScreenEllipse<double>& e = p.ellipse;
-    const long double scale = std::max(exact.xx, exact.yy);
-    const auto near = [&](const char* what, double got, long double want, long double of) {
-      const double off = static_cast<double>((got - want) / of);
-      EXPECT_NEAR(off, 0, testing::RecordDigits(what, testing::Computed::kDouble, off, 2e-14));
-    };
-    near("variance along x", e.c00 * e.c00, exact.xx, scale);
-    near("covariance", e.c00 * e.c10, exact.xy, scale);
-    near("variance along y", e.c10 * e.c10 + e.c11 * e.c11, exact.yy, scale);
-    const long double det = exact.xx * exact.yy - exact.xy * exact.xy;
-    near("determinant", e.c00 * e.c00 * e.c11 * e.c11, det, det);
-    near("filter", e.filter, sqrtl(std::max(0.0L, exact.without / det)), 1);
+  for (const double focal :
+       {std::numeric_limits<double>::infinity(), 150.0, 45.0, 15.0}) {  // of the fit, pixels
+    options.fit_pixel = 1 / focal;
+    for (int64_t i = 0; i < splats.count(); ++i) {
+      const Splat<double> splat = splats.view()[i];
+      SplatProjection<double> p;
+      if (!ProjectSplat(SplatCamera(camera), options, splat, &p)) continue;
+      limited += p.limited[0] || p.limited[1];
+      double u, v, z;
+      ASSERT_TRUE(camera.Project(splat.mean, &u, &v, &z));
+      EXPECT_NEAR(p.ellipse.u, u, 1e-12 * (1 + std::abs(u)));
+      EXPECT_NEAR(p.ellipse.v, v, 1e-12 * (1 + std::abs(v)));
+      EXPECT_NEAR(p.at.z, z, 1e-15 * z);
+      const Exact exact = ByDefinition(camera, options, splat);
+      const ScreenEllipse<double>& e = p.ellipse;
+      const long double scale = std::max(exact.xx, exact.yy);
+      const auto near = [&](const char* what, double got, long double want, long double of) {
+        const double off = static_cast<double>((got - want) / of);
+        EXPECT_NEAR(off, 0,
+                    testing::RecordDigits(what, testing::Computed::kDouble, off, 2e-14));
+      };
+      near("variance along x", e.c00 * e.c00, exact.xx, scale);
+      near("covariance", e.c00 * e.c10, exact.xy, scale);
+      near("variance along y", e.c10 * e.c10 + e.c11 * e.c11, exact.yy, scale);
+      const long double det = exact.xx * exact.yy - exact.xy * exact.xy;
+      near("determinant", e.c00 * e.c00 * e.c11 * e.c11, det, det);
+      near("filter", e.filter, sqrtl(std::clamp(exact.fitted / det, 0.0L, 1.0L)), 1);
+    }
   }
   EXPECT_GT(limited, 20);
 }
@@ -163,7 +171,7 @@ TEST(SplatProjection, IsTheDefinitionsEllipse) {
 // w of pixels near a splat, in float against double.
 double WorstOffset(const SplatArrays<double>& splats, const Camera& camera, double* filter) {
   SplatOptions options;
-  options.antialiased = true;
+  options.fit_pixel = 0;
   double worst = 0;
   for (int64_t i = 0; i < splats.count(); ++i) {
     const Splat<double> exact_splat = splats.view()[i];
@@ -220,7 +228,7 @@ TEST(SplatProjection, ADiscSeenEdgeOnHasTheBlursWidth) {
   camera.camera_from_world.translation = {0, 0, 3};
   camera.cx = 30, camera.cy = 20;
   SplatOptions options;
-  options.antialiased = true;
+  options.fit_pixel = 0;
   const Splat<float> disc{{0, 0, 0}, {std::log(0.5f), -50, std::log(0.5f)}, {1, 0, 0, 0}, 4};
   SplatProjection<float> p;
   ASSERT_TRUE(ProjectSplat(SplatCamera(camera), options, disc, &p));
@@ -237,7 +245,7 @@ TEST(SplatProjection, ScalesOfAnySizeAreFiniteInFloat) {
   const Camera camera = SplatCameraOf(60, 40);
   SplatOptions options;
   for (const bool antialiased : {false, true}) {
-    options.antialiased = antialiased;
+    options.fit_pixel = antialiased ? 0 : -1;
     for (int code = 0; code < 27; ++code) {
       SplatArrays<double> splats = RandomSplats(40, 1, 66);
       for (int64_t i = 0; i < splats.count(); ++i) {

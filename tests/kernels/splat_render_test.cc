@@ -173,7 +173,7 @@ TEST(SplatRender, TheFilterKeepsASmallSplatsLight) {
     SplatArrays<double> splats(1, 1);
     SetBall(&splats, 0, 1, sigma / 100, 6, 1);
     const auto sum = [&](bool antialiased) {
-      options.antialiased = antialiased;
+      options.fit_pixel = antialiased ? 0 : -1;
       double total = 0;
       for (const double t : RenderSplatsPlain(splats.view(), camera, options).transmittance)
         total += 1 - t;
@@ -187,12 +187,49 @@ TEST(SplatRender, TheFilterKeepsASmallSplatsLight) {
   }
 }
 
+// Three times the pixels for an angle: every third pixel is the fit's.
+TEST(SplatRender, ALargerPictureIsTheFitsPictureEnlarged) {
+  const Camera small = SplatCameraOf(24, 18);
+  Camera large = small;
+  large.width *= 3, large.height *= 3;
+  large.fx *= 3, large.fy *= 3, large.cx *= 3, large.cy *= 3;
+  SplatOptions options;
+  options.fit_pixel = 1 / std::sqrt(small.fx * small.fy);
+  const SplatArrays<double> splats = RandomSplats(60, 4, 83);
+  const auto fit = RenderSplatsPlain(splats.view(), small, options);
+  const auto enlarged = RenderSplatsPlain(splats.view(), large, options);
+  for (size_t y = 0; y < 18; ++y)
+    for (size_t x = 0; x < 24; ++x)
+      for (size_t c = 0; c < 3; ++c)
+        EXPECT_NEAR(enlarged.color[3 * (72 * (3 * y + 1) + 3 * x + 1) + c],
+                    fit.color[3 * (24 * y + x) + c], 1e-12);
+}
+
+// Whatever the size, a splat covers the solid angle that the fit saw, its blur included.
+TEST(SplatRender, ASmallerPictureKeepsTheFitsLight) {
+  const Camera camera = StraightCamera(31);
+  SplatOptions options;
+  for (const double r : {0.3, 0.5, 0.8}) {
+    options.fit_pixel = r / 100;
+    for (const double sigma : {0.1, 0.5, 2.0}) {  // pixels of this picture
+      SplatArrays<double> splats(1, 1);
+      SetBall(&splats, 0, 1, sigma / 100, 6, 1);
+      double total = 0;
+      for (const double t : RenderSplatsPlain(splats.view(), camera, options).transmittance)
+        total += 1 - t;
+      const double fitted = sigma * sigma + 0.3 * r * r, rho = fitted / (sigma * sigma + 0.3);
+      const double exact = 2 * M_PI * fitted, missing = 1 / (255 * rho) + 0.006;
+      EXPECT_NEAR(total / exact, 1 - missing / 2, missing / 2 + 0.003) << r << " " << sigma;
+    }
+  }
+}
+
 // Ten thousand splats around one ray, in float and double.
 TEST(SplatRender, FloatAgreesWithDoubleOverTenThousandSplatsOnOneRay) {
   const Camera camera = StraightCamera(5);
   for (const bool antialiased : {false, true}) {
     SplatOptions options;
-    options.antialiased = antialiased;
+    options.fit_pixel = antialiased ? 0 : -1;
     SplatArrays<double> splats = RandomSplats(10000, 4, 84, 0.2, 2);
     for (size_t i = 0; i < 10000; ++i) {
       splats.mean[3 * i + 2] = Draw(85, i, 0, 1, 50);
@@ -231,7 +268,7 @@ TEST(SplatRender, FloatAgreesWithDoubleInRandomScenes) {
   for (const bool antialiased : {false, true})
     for (const double spread : {0.8, 3.0}) {  // the second is around the camera, too
       SplatOptions options;
-      options.antialiased = antialiased;
+      options.fit_pixel = antialiased ? 0 : -1;
       const SplatArrays<double> splats = RoundedToFloat(RandomSplats(800, 16, 86, spread));
       const auto exact = RenderSplatsPlain(splats.view(), camera, options);
       const auto got = RenderSplatsPlain(CastSplats<float>(splats).view(), camera, options);

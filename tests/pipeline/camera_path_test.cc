@@ -139,7 +139,7 @@ RadianceField WallOfSplats() {
     splat.opacity_logit = std::log(99.0f);
     splats.Set(i, splat);
   }
-  return FieldOfSplats(splats, {{}, {0, 0, 0}, {1, 1, 1}}, 0, false);
+  return FieldOfSplats(splats, {{}, {0, 0, 0}, {1, 1, 1}}, 0, -1);
 }
 
 // Photos' places beside a wall: a path along them is clear, one through the wall is not.
@@ -177,7 +177,7 @@ TEST(PathClearance, SegmentsOfALineAddUpToTheSplatsOpacity) {
   splat.quaternion[0] = 0.9f, splat.quaternion[1] = 0.2f, splat.quaternion[2] = -0.3f;
   splat.opacity_logit = 1;
   splats.Set(0, splat);
-  const RadianceField field = FieldOfSplats(splats, {{}, {0, 0, 0}, {1, 1, 1}}, 0, false);
+  const RadianceField field = FieldOfSplats(splats, {{}, {0, 0, 0}, {1, 1, 1}}, 0, -1);
   const Vec3d mean = splat.mean.Cast<double>(), way{3, 1, 2};
   std::vector<Vec3d> path;
   for (const double t : {-1.0, -0.1, -0.02, 0.05, 0.3, 1.0}) path.push_back(mean + way * t);

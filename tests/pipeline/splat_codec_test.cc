@@ -30,7 +30,7 @@ RadianceField FieldOf(int64_t count, int basis, bool antialiased = false) {
   Splats splats = testing::CastSplats<float>(testing::RandomSplats(count, basis, 3, 1.4, 0.03));
   for (size_t i = 0; i < splats.sh.size(); ++i)
     if (i % static_cast<size_t>(basis) != 0) splats.sh[i] *= 0.4f;
-  return FieldOfSplats(splats, box, 0.1f, antialiased);
+  return FieldOfSplats(splats, box, 0.1f, antialiased ? 0.0f : -1.0f);
 }
 
 Image Picture(const RadianceField& field) {
@@ -42,7 +42,7 @@ TEST(SplatCodec, DecodedSplatsRenderAsTheExactOnes) {
     for (const bool antialiased : {false, true}) {
       const RadianceField field = FieldOf(800, basis, antialiased);
       const RadianceField decoded = DecodeField(EncodeField(field, kSplatPageStep));
-      EXPECT_EQ(decoded.geometry->splats.antialiased, antialiased);
+      EXPECT_EQ(decoded.geometry->splats.fit_pixel, field.geometry->splats.fit_pixel);
       EXPECT_GE(testing::Psnr(Picture(field), Picture(decoded)), 48) << basis;
     }
 }

@@ -32,7 +32,7 @@ using testing::TemporaryFolder;
 const GridFrame kBox{{}, {0.1f, 0, 0}, {1, 2, 1}};
 
 RadianceField SmallSplatField(int64_t count, int basis, uint64_t seed = 1) {
-  return FieldOfSplats(CastSplats<float>(RandomSplats(count, basis, seed)), kBox, 0.2f, false);
+  return FieldOfSplats(CastSplats<float>(RandomSplats(count, basis, seed)), kBox, 0.2f, -1);
 }
 
 template <typename A, typename B>

@@ -51,7 +51,7 @@ TEST(SplatFiles, WhatTheWriterWritesComesBack) {
     for (const bool antialiased : {false, true}) {
       const Splats splats = SomeSplats(basis, 50);
       const StoredField stored{
-          FieldOfSplats(splats, {{}, {}, {1, 1, 1}}, 0.2f, antialiased), {}, {}};
+          FieldOfSplats(splats, {{}, {}, {1, 1, 1}}, 0.2f, antialiased ? 0.0f : -1.0f), {}, {}};
       WriteSplatPly(folder / "field.ply", stored, "a comment");
       const SplatScene scene = ReadSplats(folder / "field.ply");
       EXPECT_EQ(scene.format, SplatFormat::kPly);

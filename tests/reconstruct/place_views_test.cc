@@ -65,8 +65,7 @@ PlacedViews Place(const Splats& splats, const Vec3d& up) {
   const SplatExtent extent = ExtentOf(splats);
   const auto radius = static_cast<float>(extent.radius);
   const FieldRenderer renderer(
-      FieldOfSplats(splats, {{}, extent.center.Cast<float>(), {radius, radius, radius}}, 0,
-                    false),
+      FieldOfSplats(splats, {{}, extent.center.Cast<float>(), {radius, radius, radius}}, 0, -1),
       Backend::kCpu);
   return PlaceViews(splats, renderer, up, 96, "scene.ply", {});
 }

@@ -290,7 +290,7 @@ TEST(FillFeatures, SplatsFarOutsideStayInReach) {
   Splats splats(3, 1);
   const Vec3f means[] = {{2, 1, -3}, {5, 1, -1}, {1e20f, 0, 1}};
   for (int i = 0; i < 3; ++i) splats.Set(i, {.mean = means[i]});
-  const RadianceField field = FieldOfSplats(splats, {{}, {1, 1, -1}, {2, 1, 4}}, 0, false);
+  const RadianceField field = FieldOfSplats(splats, {{}, {1, 1, -1}, {2, 1, 4}}, 0, -1);
   const Vec3f expected[] = {{0.5f, 0, -0.5f}, {1.5f, 0, 0}, {2, 0, 0}};
   for (int i = 0; i < 3; ++i) {
     float row[kFeatureStride];

@@ -38,7 +38,7 @@ inline RadianceField SplatBall(int64_t count, float contrast = 1, int basis = 9)
                               -1, 1)));
   }
   splats.background = {0.2f, 0.3f, 0.1f};
-  return FieldOfSplats(splats, GridFrame{}, 0.2f, false);
+  return FieldOfSplats(splats, GridFrame{}, 0.2f, -1);
 }
 
 // Views of a ball of splats with a style applied to each colour.

@@ -12,8 +12,8 @@ uniform mat3 uWorldFromCamera;
 uniform vec3 uEye;
 uniform vec4 uLens;  // focal lengths and principal point, pixels
 uniform vec2 uSize;
-uniform float uNearPlane, uBlur, uScaleStep, uRotationStep;
-uniform int uAntialiased;
+uniform float uNearPlane, uScaleStep, uRotationStep;
+uniform vec2 uBlur;  // added, fitted: see EQ(splat-filter)
 layout(location = 0) out uvec4 place;  // u, v, c00, c10
 layout(location = 1) out uvec4 light;  // c11, ln(o rho), red and green, blue
 
@@ -66,10 +66,11 @@ void main() {
   vec3 a0 = scale * perZ.x * (vec3(axes[0].x, axes[1].x, axes[2].x) - t.x * vec3(axes[0].z, axes[1].z, axes[2].z));
   vec3 a1 = scale * perZ.y * (vec3(axes[0].y, axes[1].y, axes[2].y) - t.y * vec3(axes[0].z, axes[1].z, axes[2].z));
   vec3 area = (scale.yzx * perZ.x) * (scale.zxy * perZ.y) * across;
-  float c00 = sqrt(dot(a0, a0) + uBlur), c10 = dot(a0, a1) / c00;
-  float c11 = sqrt(dot(area / c00, area / c00) + uBlur * (1.0 + dot(a1 / c00, a1 / c00)));
+  float c00 = sqrt(dot(a0, a0) + uBlur.x), c10 = dot(a0, a1) / c00;
+  float c11 = sqrt(dot(area / c00, area / c00) + uBlur.x * (1.0 + dot(a1 / c00, a1 / c00)));
   float logOpacity = uintBitsToFloat(own.w);
-  if (uAntialiased == 1) logOpacity += log(length(area) / c00 / c11);
+  if (uBlur.y < uBlur.x)
+    logOpacity += log(length(vec2(length(area) / c11, length(vec3(length(a0), length(a1), sqrt(uBlur.y)) / c11) * sqrt(uBlur.y))) / c00);
   if (!(logOpacity >= kLogMinAlpha)) return;
   vec3 color = ColorAt(at, normalize(from));
   place = floatBitsToUint(vec4(screen, c00, c10));

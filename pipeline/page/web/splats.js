@@ -91,10 +91,10 @@ class SplatScene {
     this.seenAs = key;
     this.graphics.setView(p, view, width, height);
     gl.uniform1f(u('uNearPlane'), splats.near_plane);
-    gl.uniform1f(u('uBlur'), splats.blur);
+    const larger = splats.fit_pixel < 0 ? 1 : view.lens[0] * view.lens[1] * splats.fit_pixel ** 2;
+    gl.uniform2f(u('uBlur'), splats.blur * Math.max(1, larger), splats.blur * Math.min(1, larger));
     gl.uniform1f(u('uScaleStep'), splats.scale_step);
     gl.uniform1f(u('uRotationStep'), splats.rotation_step);
-    gl.uniform1i(u('uAntialiased'), splats.antialiased ? 1 : 0);
     gl.bindFramebuffer(gl.FRAMEBUFFER, this.framebuffer);
     gl.viewport(0, 0, WIDTH, this.mean.height);
     gl.drawArrays(gl.TRIANGLES, 0, 3);
