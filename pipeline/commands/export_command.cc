@@ -68,6 +68,10 @@ void RunExport(const Command& command, const Arguments& arguments, Console* cons
   if (!prepared) return;
   const std::string& folder = prepared->words[0];
   RequireValue(settings.out, "--out", "name the folder or file to write");
+  settings.thousands_given = options.Given("splats").has_value();
+  if (settings.thousands_given && !IsSplatExport(settings.format))
+    throw UsageError("is of formats of splats", "--splats",
+                     "add --format ply, or leave it out");
   const bool fields = settings.format == "svox2" || settings.format == "points" ||
                       IsSplatExport(settings.format);
   if (settings.resolution != 0 && settings.format != "svox2")

@@ -59,10 +59,13 @@ void ExportPoints(const ExportOptions& options, const std::string& folder,
       Concat("wrote ", to, ": ", Counted(std::ssize(points), "point"), ", approximate"));
 }
 
-void CheckSuits(const std::string& format, bool splats) {
-  if (splats && !IsSplatExport(format))
+void CheckSuits(const ExportOptions& options, bool splats) {
+  if (splats && options.thousands_given)
+    throw UsageError("is of voxels that become splats, and this field has splats", "--splats",
+                     "leave it out: they are written as they are");
+  if (splats && !IsSplatExport(options.format))
     throw UsageError(
-        "is of voxels, and this field has splats", "--format " + format,
+        "is of voxels, and this field has splats", "--format " + options.format,
         "use --format ply, spz, glb or compressed-ply, or fit the scene with --field voxels");
 }
 
@@ -138,7 +141,7 @@ void ExportFields(const ExportOptions& options, const std::string& folder, Conso
   }
   StoredField field = ReadFieldFile(folder + "/field.npz");
   const bool splats = field.field.geometry->splats.on();
-  CheckSuits(options.format, splats);
+  CheckSuits(options, splats);
   MakeEmptyFolder(options.out, "");
   std::optional<VoxelsAsSplats> fitted;
   if (IsSplatExport(options.format) && !splats) fitted.emplace(folder, options, field, console);

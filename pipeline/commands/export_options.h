@@ -12,6 +12,7 @@ struct ExportOptions {
   std::vector<std::string> names;
   int resolution = 0;
   float thousands = 500;
+  bool thousands_given = false;
   bool dry_run = false;
 
   template <typename Bind>

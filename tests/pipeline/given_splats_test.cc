@@ -146,6 +146,11 @@ void ExpectExports(const TemporaryFolder& folder, const Capture& capture) {
   EXPECT_EQ(done.code, static_cast<int>(ExitCode::kInput));
   done = Regrade({"export", run, "--name", "sun", "--out", to});
   EXPECT_EQ(done.code, static_cast<int>(ExitCode::kUsage));
+  for (const char* format : {"ply", "transforms"}) {
+    done = Regrade({"export", run, "--format", format, "--splats", "9", "--out", to});
+    EXPECT_EQ(done.code, static_cast<int>(ExitCode::kUsage));
+    EXPECT_NE(done.text.find("--splats"), std::string::npos) << done.text;
+  }
   EXPECT_FALSE(fs::exists(to));
 }
 

@@ -164,7 +164,7 @@ void WritePages(const std::string& folder, const std::string& name, const Radian
 RadianceField SplatsField() {
   const GridFrame box{{}, {0, 0, 0}, {0.8f, 1, 0.7f}};
   const auto splats = testing::RandomSplats(600, 9, 5, 1.3, 0.02);
-  RadianceField field = FieldOfSplats(testing::CastSplats<float>(splats), box, 0.1f, 0);
+  RadianceField field = FieldOfSplats(testing::CastSplats<float>(splats), box, 0.1f, 1 / 60.0f);
   for (int64_t i = 0; i < field.appearance.sh.size(); ++i)
     if (i % 9 != 0) field.appearance.sh[i] *= 0.4f;
   return field;
