@@ -20,8 +20,9 @@ namespace regrade {
 namespace {
 
 // Of the step of voxels' colours: a sample of those is the mean of eight corners, whose
-// roundings differ.
-constexpr double kColorPart = 0.67;
+// roundings differ. The still life's draft is 5 to 8 dB better than with twice of it, for 3.6
+// bytes a splat.
+constexpr double kColorPart = 0.33;
 
 // The splats [begin, end) of a page that are packed together.
 struct Part {

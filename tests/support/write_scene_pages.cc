@@ -176,9 +176,9 @@ void WritePageOfRun(const std::string& folder, const std::string& run,
   const MadePage made = MakePage(run, {name}, {}, {});
   const StoredField stored = ReadFieldFile(run + "/field.npz");
   const WorkingViews photos = ReadWorkingViews(run + "/poses", kLongest, 0).InField(stored);
+  RadianceField page = DecodeField(EncodeField(stored.field, PageOptions{}.step));
   const PageStyle style =
-      EncodeStyle(ReadNetworkFile(StyleFolder(run, name) + "/network.npz"), made.field, 1);
-  RadianceField page = made.field;
+      EncodeStyle(ReadNetworkFile(StyleFolder(run, name) + "/network.npz"), page, 1);
   page.appearance = PadShBasis(std::move(page.appearance), 9);
   JsonValue::Array views;
   for (const double weight : {0.0, 1.0})

@@ -83,12 +83,10 @@ async function start(page) {
       painter.change();
     }).catch(failed).finally(() => tried.add(i));
   }
-  // What the sliders want, of the scene that is shown and of the whole one.
+  // What the sliders want, of the scene that is shown: the coarse one has the processor's cores to itself.
   const wanted = () => weights().flatMap((weight, i) => weight > 0 ? [i] : []);
-  const loadWanted = () => Promise.all(wanted().map((i) => {
-    const made = load(i);
-    return scene.coarse ? coarse.loading[i] ??= coarse.make(i, () => {}, null).then(() => painter.change()).catch(failed) : made;
-  }));
+  const loadWanted = () => Promise.all(wanted().map((i) => !scene.coarse ? load(i)
+      : coarse.loading[i] ??= coarse.make(i, () => {}, null).then(() => painter.change()).catch(failed)));
   const isStyled = () => wanted().every((i) => stylesOf(scene).colors[i]);
   const pictureOf = (width, height) => {
     const styled = setsOf(weights()), source = [{weight: 1, colors: scene.source}];

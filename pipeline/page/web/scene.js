@@ -19,9 +19,12 @@ async function decodedField(header, prefix, inWorker, progress) {
   const task = {header: {resolution, basis, finest, voxels, color, splats, center, radius, residuals}, text};
   const made = inWorker && await decodedByWorker(task, progress);
   if (made) return made;
+  let waited = performance.now();  // browsers make timers that follow each other last for milliseconds
   return decodeField(task.header, text, async (part) => {
     progress(part);
+    if (performance.now() - waited < 15) return;
     await wait();
+    waited = performance.now();
   });
 }
 
@@ -85,10 +88,9 @@ function sceneOf(header, made, graphics) {
 async function loadCoarse(header, graphics) {
   const coarse = header.splats?.coarse > 0 ? header : header.coarse;
   if (!coarse) return null;
+  if (header.splats) SplatScene.warm(header, graphics, [0, 1].includes(header.styles[0]?.strength ?? 0) ? 1 : 2);
   const made = await decodedField(coarse, 'coarse_', false, () => {});
-  const scene = Object.assign(sceneOf({...coarse, ndc: header.ndc, spheres: null}, made, graphics), {coarse: true});
-  scene.warm?.([0, 1].includes(header.styles[0]?.strength ?? 0) ? 1 : 2);
-  return scene;
+  return Object.assign(sceneOf({...coarse, ndc: header.ndc, spheres: null}, made, graphics), {coarse: true});
 }
 
 // `made`: by decodedField.

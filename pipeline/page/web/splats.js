@@ -21,7 +21,7 @@ function splatPrograms(graphics, count) {
 }
 
 class SplatScene {
-  // `made`: see decodeSplats; its large parts are taken.
+  // `made`: see decodeSplats; its large parts are taken. Without points it cannot be drawn.
   constructor(header, made, graphics) {
     const {voxels, slots, positionUnit, shift} = made, {gl} = graphics;
     Object.assign(this, {header, voxels, slots, positionUnit, shift, graphics});
@@ -31,7 +31,9 @@ class SplatScene {
     this.seen = [graphics.blank('u4', this.mean.height), graphics.blank('u4', this.mean.height)];
     this.source = {color: this.color, code: header.color, texelScale: [1, 1, 1], background: header.background};
     this.kept = {place: new Blob([made.place]), earlier: new Blob([made.earlier])};
-    this.sorter = new DepthOrder(made.points);
+    // A texture is read when all that was drawn before is done.
+    if (graphics.onCores) this.kept.color = new Blob([made.color]);
+    if (made.points) this.sorter = new DepthOrder(made.points);
     this.order = graphics.blank('i1', this.mean.height);
     this.array = gl.createVertexArray();
     gl.bindVertexArray(this.array);
@@ -46,19 +48,22 @@ class SplatScene {
   get parts() { return [this.mean, this.shape, this.color, ...this.seen, this.order]; }
   free() {
     const gl = this.graphics.gl;
-    this.sorter.end();
+    this.sorter?.end();
     this.parts.forEach((texture) => this.graphics.free(texture));
     gl.deleteBuffer(this.corners);
     gl.deleteVertexArray(this.array);
     gl.deleteFramebuffer(this.framebuffer);
   }
   // Begins to prepare the programs for `count` sets, which takes a while: draws nothing.
-  warm(count) {
-    const target = this.graphics.target(1, 1), sets = Array.from({length: count}, () => ({weight: 1, colors: this.source}));
-    this.draw({rotation: [1, 0, 0, 0, 1, 0, 0, 0, 1], eye: [0, 0, 0], lens: [1, 1, 0.5, 0.5]}, sets, null, target,
-              {x: 0, y: 0, width: 1, height: 1});
-    this.graphics.gl.flush();
+  static warm(header, graphics, count) {
+    const none = new Uint32Array(4), made = {voxels: 1, slots: 1, mean: none, shape: none, color: none, place: none, earlier: none};
+    const scene = new SplatScene(header, made, graphics), target = graphics.target(1, 1);
+    const sets = Array.from({length: count}, () => ({weight: 1, colors: scene.source}));
+    scene.draw({rotation: [1, 0, 0, 0, 1, 0, 0, 0, 1], eye: [0, 0, 0], lens: [1, 1, 0.5, 0.5]}, sets, null, target,
+               {x: 0, y: 0, width: 1, height: 1});
+    graphics.gl.flush();
     target.free();
+    scene.free();
   }
   // A promise: until something else is awaited, what is drawn next is in the order of this view.
   async arrange(view) {

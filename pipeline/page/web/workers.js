@@ -116,8 +116,11 @@ function workerOfStyle() {
 // Fills `colors` from the source, strip by strip; `layers` as loadWeights has them; `place` and `residual` of all slots.
 async function restyleOnCores(graphics, scene, style, layers, {place, residual}, colors, progress) {
   const gl = graphics.gl, url = URL.createObjectURL(new Blob(['(' + workerOfStyle + ')()'], {type: 'text/javascript'}));
-  const {height} = scene.source.color, rows = 8, framebuffer = gl.createFramebuffer();
+  const count = Math.max(1, Math.min(8, navigator.hardwareConcurrency || 2));
+  const {height} = scene.source.color, rows = Math.min(8, Math.ceil(height / count)), framebuffer = gl.createFramebuffer();
+  const kept = scene.kept.color && await asWords(scene.kept.color);
   const read = (texture, y, count) => {
+    if (kept) return kept.slice(4 * WIDTH * y, 4 * WIDTH * (y + count));
     const data = new Uint32Array(4 * WIDTH * count);
     gl.bindFramebuffer(gl.FRAMEBUFFER, framebuffer);
     gl.framebufferTexture2D(gl.FRAMEBUFFER, gl.COLOR_ATTACHMENT0, gl.TEXTURE_2D, texture.texture, 0);
@@ -140,7 +143,7 @@ async function restyleOnCores(graphics, scene, style, layers, {place, residual},
                  omega: style.omega, activation: style.activation, positionScale: style.position_scale,
                  residualScale: style.residual?.scale ?? [0, 0, 0], unit: scene.positionUnit, shift: scene.shift};
   let next = 0, done = 0;
-  const workers = Array.from({length: Math.max(1, Math.min(8, navigator.hardwareConcurrency || 2))}, () => new Worker(url));
+  const workers = Array.from({length: Math.min(count, Math.ceil(height / rows))}, () => new Worker(url));
   try {
     await Promise.all(workers.map((worker) => new Promise((finish, fail) => {
       const give = () => {
