@@ -1,5 +1,8 @@
 #include "kernels/render/splat_renderer.h"
 
+#include <mutex>
+#include <utility>
+
 #include "kernels/base/error.h"
 #include "kernels/splats/cpu/render_splats.h"
 #include "kernels/splats/cuda/device_splat_renderer.h"
@@ -40,7 +43,10 @@ class CpuSplatRenderer : public SplatRenderer {
   using SplatRenderer::SplatRenderer;
 
   RenderedView Render(const Camera& camera) const override {
-    return RenderedSplats(RenderSplats(FrameOf(camera)));
+    SplatFrame frame = FrameOf(camera);
+    RenderedView view = RenderedSplats(RenderSplats(frame));
+    Keep(std::move(frame));
+    return view;
   }
 
   RenderedPair RenderWith(const KindRenderer& other, const Camera& camera) const override {
@@ -49,13 +55,27 @@ class CpuSplatRenderer : public SplatRenderer {
     RenderedPair pair{RenderedSplats(RenderSplats(frame)), {}};
     Recolor(SplatsOf(same.field_), &frame);
     pair.other_color = RenderedSplats(RenderSplats(frame)).color;
+    Keep(std::move(frame));
     return pair;
   }
 
  private:
   SplatFrame FrameOf(const Camera& camera) const {
-    return MakeSplatFrame(SplatsOf(field_), PinholeOf(camera), options_);
+    SplatFrame frame;
+    {
+      const std::lock_guard lock(mutex_);
+      frame = std::exchange(kept_, {});
+    }
+    MakeSplatFrame(SplatsOf(field_), PinholeOf(camera), options_, &frame);
+    return frame;
   }
+  void Keep(SplatFrame frame) const {
+    const std::lock_guard lock(mutex_);
+    kept_ = std::move(frame);
+  }
+
+  mutable std::mutex mutex_;
+  mutable SplatFrame kept_;  // the last one, for its memory: fresh pages take long
 };
 
 class CudaSplatRenderer : public SplatRenderer {

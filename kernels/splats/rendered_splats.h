@@ -2,6 +2,8 @@
 #pragma once
 
 #include <algorithm>
+#include <utility>
+#include <vector>
 
 #include "kernels/field/render.h"
 #include "kernels/splats/render_picture.h"
@@ -9,18 +11,21 @@
 namespace regrade {
 
 // Colours clipped; expected depths, 0 where less than half of the light is from splats.
-inline RenderedView RenderedSplats(const SplatPicture<float>& picture) {
-  RenderedView view{Image(picture.width, picture.height),
-                    Image(picture.width, picture.height, 1),
-                    Image(picture.width, picture.height, 1)};
-  std::ranges::transform(picture.color, view.color.pixels.begin(),
-                         [](float value) { return std::clamp(value, 0.0f, 1.0f); });
-  view.transmittance.pixels = picture.transmittance;
+inline RenderedView RenderedSplats(SplatPicture<float> picture) {
+  for (float& value : picture.color) value = std::clamp(value, 0.0f, 1.0f);
   for (size_t i = 0; i < picture.depth.size(); ++i) {
     const float weight = 1 - picture.transmittance[i];
-    view.depth.pixels[i] = weight < 0.5f ? 0.0f : picture.depth[i] / weight;
+    picture.depth[i] = weight < 0.5f ? 0.0f : picture.depth[i] / weight;
   }
-  return view;
+  const auto image = [&picture](int channels, std::vector<float>* values) {
+    Image made;
+    made.width = picture.width, made.height = picture.height, made.channels = channels;
+    made.pixels = std::move(*values);
+    return made;
+  };
+  return {.color = image(3, &picture.color),
+          .depth = image(1, &picture.depth),
+          .transmittance = image(1, &picture.transmittance)};
 }
 
 }  // namespace regrade

@@ -1,16 +1,22 @@
 // Frames of a run's film in fewer rays (EQ(smooth-pixels)) against all rays, on the CPU:
 //   film_benchmark DIR STYLE LONGER_SIDE FRAMES
 // DIR is an output folder, STYLE the name of a finished style. Prints one line for each
-// tolerance: rays, time, and the PSNR of the worst frame of both pictures.
+// tolerance: rays, time, and the PSNR of the worst frame of both pictures. Of splats, which
+// have no frames in fewer rays: the median frame's time and work, without a style (STYLE is not
+// read).
 #include <algorithm>
 #include <cstdio>
 #include <cstdlib>
+#include <ctime>
 #include <string>
 #include <vector>
 
 #include "kernels/base/clock.h"
 #include "kernels/base/error.h"
 #include "kernels/field/cpu/render_film.h"
+#include "kernels/render/field_renderer.h"
+#include "kernels/splats/cpu/splat_frame.h"
+#include "kernels/splats/splat_field.h"
 #include "pipeline/capture/working_views.h"
 #include "pipeline/fields/camera_path.h"
 #include "pipeline/fields/film_timing.h"
@@ -20,13 +26,45 @@
 namespace regrade {
 namespace {
 
+template <typename T>
+T MedianOf(std::vector<T> values) {
+  std::ranges::nth_element(values, values.begin() + std::ssize(values) / 2);
+  return values[values.size() / 2];
+}
+
+void TimeSplats(const RadianceField& field, const std::vector<Camera>& path) {
+  const FieldRenderer renderer(field, Backend::kCpu);
+  std::vector<double> whole, processor;
+  std::vector<int64_t> seen, entries;
+  for (Camera camera : path) {
+    camera.ndc = {};
+    const double begin = ClockSeconds();
+    const std::clock_t used = std::clock();
+    renderer.Render(camera);
+    whole.push_back(ClockSeconds() - begin);
+    processor.push_back(static_cast<double>(std::clock() - used) / CLOCKS_PER_SEC);
+    const SplatFrame frame = MakeSplatFrame(SplatsOf(field), camera, SplatOptionsOf(field));
+    seen.push_back(
+        std::ranges::count_if(frame.box, [](const PixelBox& box) { return !box.empty(); }));
+    entries.push_back(std::ssize(frame.entry_splat));
+  }
+  std::printf(
+      "median of %zu frames of %dx%d: %.1f ms, %.1f ms of the processor; %lld of %lld splats "
+      "seen, %lld entries of tiles\n",
+      path.size(), path[0].width, path[0].height, 1e3 * MedianOf(whole),
+      1e3 * MedianOf(processor), static_cast<long long>(MedianOf(seen)),
+      static_cast<long long>(field.geometry->num_voxels()),
+      static_cast<long long>(MedianOf(entries)));
+}
+
 void Compare(const std::string& folder, const std::string& style, int size, int frames) {
   const StoredField before = ReadFieldFile(folder + "/field.npz");
-  const StoredField after = ReadStyledField(folder, folder + "/styles/" + style);
-  const FastGrid grid = MakeFastGrid(before.field), other = MakeFastGrid(after.field);
   const WorkingViews views = ReadWorkingViews(folder + "/poses", size, 0).InField(before);
   const std::vector<Camera> path =
       MakeCameraPath(views.Cameras(), PathOptions(), EvenMoments(frames));
+  if (before.field.geometry->splats.on()) return TimeSplats(before.field, path);
+  const StoredField after = ReadStyledField(folder, folder + "/styles/" + style);
+  const FastGrid grid = MakeFastGrid(before.field), other = MakeFastGrid(after.field);
   const MarchOptions exact{before.field.step}, early{before.field.step, 1e-3f};
   struct Row {
     float tolerance;
