@@ -4,6 +4,7 @@
 
 #include "kernels/base/error.h"
 #include "pipeline/capture/given_colmap_model.h"
+#include "pipeline/capture/measured_depths.h"
 #include "pipeline/capture/nsvf_cameras.h"
 #include "pipeline/capture/picture_folders.h"
 #include "pipeline/capture/transforms_source.h"
@@ -47,9 +48,15 @@ CaptureSource PolycamSource(const fs::path& keyframes) {
                    poses = keyframes / (kind + "cameras");
     if (!IsFolder(pictures) || !IsFolder(poses)) continue;
     CaptureSource source{CaptureKind::kPolycam, pictures.string(), poses.string()};
-    source.notes.push_back(
-        "a raw export of Polycam: " + kind + "images and " + kind +
-        "cameras of its keyframes are taken; depth and confidence are no photos");
+    std::error_code error;
+    for (fs::directory_iterator it(pictures, error), end; !error && it != end;
+         it.increment(error)) {
+      const fs::path map = keyframes / "depth" / it->path().stem().concat(".png");
+      if (IsFile(map)) source.depths[it->path().filename().string()] = map.string();
+    }
+    source.notes.push_back("a raw export of Polycam: " + kind + "images and " + kind +
+                           "cameras of its keyframes are taken" +
+                           (source.depths.empty() ? "" : ", and their depths"));
     return source;
   }
   return {};
@@ -90,8 +97,12 @@ CaptureSource SourceOf(const fs::path& root) {
     return {CaptureKind::kLlff, (pictures.empty() ? root : pictures).string(),
             (root / "poses_bounds.npy").string()};
   for (const fs::path& poses : {root / "poses", root})
-    if (IsFile(poses / "photos.json") && HoldsColmapModel(poses / "sparse"))
-      return {CaptureKind::kPosed, (poses / "photos").string(), (poses / "sparse").string()};
+    if (IsFile(poses / "photos.json") && HoldsColmapModel(poses / "sparse")) {
+      CaptureSource posed{CaptureKind::kPosed, (poses / "photos").string(),
+                          (poses / "sparse").string()};
+      FindStagedDepths((poses / "depths").string(), &posed.depths, &posed.depth_unit);
+      return posed;
+    }
   if (const GivenColmapModel given = FindColmapModel(root); !given.model.empty()) {
     CaptureSource source{CaptureKind::kColmap, given.pictures.string(), given.model.string()};
     if (!given.note.empty()) source.notes.push_back(given.note);

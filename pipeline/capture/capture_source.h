@@ -31,6 +31,9 @@ struct CaptureSource {
   std::set<std::string> test = {};  // of them, those for tests; empty: not said
   // By photo: the mask that the poses name for it, an absolute path.
   std::map<std::string, std::string> masks = {};
+  // Likewise, maps of measured depths (measured_depths.h), and their unit in world units.
+  std::map<std::string, std::string> depths = {};
+  double depth_unit = 1e-3;
   std::vector<std::string> not_photos = {};  // folders in `photos` that are left; absolute
   std::vector<std::string> notes = {};  // sentences for the user: what was chosen, what is left
 };

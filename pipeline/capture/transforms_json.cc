@@ -222,6 +222,16 @@ TransformsFile ReadTransformsJson(const std::string& path, const PictureSizeFunc
       result.frames.back().mask = pictures.Find(mask, PlaceIn(path, *frame.Find("mask_path")));
       if (result.frames.back().mask.empty()) result.missing_masks.push_back(mask);
     }
+    if (const std::string depth = NameIn(path, frame, "depth_file_path"); !depth.empty()) {
+      result.frames.back().depth =
+          pictures.Find(depth, PlaceIn(path, *frame.Find("depth_file_path")));
+      if (result.frames.back().depth.empty()) result.missing_depths.push_back(depth);
+    }
+  }
+  if (const JsonValue* unit = top.Find("depth_unit_scale_factor"); unit != nullptr) {
+    result.depth_unit = unit->IsNumber() ? unit->AsDouble() : 0;
+    if (!(result.depth_unit > 0 && std::isfinite(result.depth_unit)))
+      Refuse(path, *unit, "depth_unit_scale_factor is not a positive number");
   }
   const TransformsSplit split = ReadTransformsSplit(path, top, file_of);
   for (const TransformsFrame& frame : result.frames)

@@ -16,13 +16,16 @@ namespace regrade {
 struct TransformsFrame {
   std::string file;  // relative to the folder of the file, as the picture is called on disk
   Camera camera;
-  std::string mask = {};  // likewise, by "mask_path"; empty: none
+  std::string mask = {};   // likewise, by "mask_path"; empty: none
+  std::string depth = {};  // likewise, by "depth_file_path"
 };
 
 struct TransformsFile {
   std::vector<TransformsFrame> frames;     // in the file's order; pictures that exist
   std::vector<std::string> missing;        // listed, but not there
   std::vector<std::string> missing_masks;  // likewise
+  std::vector<std::string> missing_depths;
+  double depth_unit = 1e-3;  // "depth_unit_scale_factor": world units
   // By "test_filenames", or "val_filenames" where there are none, and "train_filenames": files
   // of frames for tests, and of frames for neither.
   std::set<std::string> test, left;

@@ -32,11 +32,11 @@ fs::path CommonFolder(const fs::path& root, const std::vector<TransformsFrame>& 
   return common;
 }
 
-// Folders beside the capture from which pictures or masks are taken.
+// Folders beside the capture from which pictures, masks or depths are taken.
 std::vector<std::string> FoldersBeside(const std::vector<TransformsFrame>& frames) {
   std::set<std::string> folders;
   for (const TransformsFrame& frame : frames)
-    for (const std::string& file : {frame.file, frame.mask})
+    for (const std::string& file : {frame.file, frame.mask, frame.depth})
       if (file.starts_with("../")) folders.insert(fs::path(file).parent_path().string());
   return {folders.begin(), folders.end()};
 }
@@ -54,6 +54,10 @@ void AddNotes(const TransformsFile& file, CaptureSource* source) {
                            " photos are missing: ", file.missing_masks[0],
                            (file.missing_masks.size() > 1 ? " and others" : ""),
                            "; all of these photos is learned"));
+  if (!file.missing_depths.empty())
+    notes.push_back(Concat("the depths of ", file.missing_depths.size(),
+                           " photos are missing: ", file.missing_depths[0],
+                           (file.missing_depths.size() > 1 ? " and others" : "")));
   if (!file.left.empty())
     notes.push_back(Concat(file.left.size(),
                            " photos are neither for training nor for tests and are left out: ",
@@ -85,6 +89,7 @@ CaptureSource TransformsSource(const fs::path& root) {
     }
     file.frames.insert(file.frames.end(), tests.frames.begin(), tests.frames.end());
   }
+  source.depth_unit = file.depth_unit;
   const fs::path photos = CommonFolder(root, file.frames);
   source.photos = photos.string();
   for (const TransformsFrame& frame : file.frames) {
@@ -95,6 +100,8 @@ CaptureSource TransformsSource(const fs::path& root) {
     if (file.test.contains(frame.file)) source.test.insert(name);
     if (!frame.mask.empty())
       source.masks[name] = (root / frame.mask).lexically_normal().string();
+    if (!frame.depth.empty())
+      source.depths[name] = (root / frame.depth).lexically_normal().string();
   }
   AddNotes(file, &source);
   return source;

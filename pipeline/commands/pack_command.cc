@@ -4,6 +4,7 @@
 
 #include "kernels/base/error.h"
 #include "kernels/image/resize.h"
+#include "pipeline/capture/measured_depths.h"
 #include "pipeline/capture/packed_capture.h"
 #include "pipeline/capture/scene_profile.h"
 #include "pipeline/capture/working_views.h"
@@ -77,8 +78,10 @@ void RunPack(const Command& command, const Arguments& arguments, Console* consol
   std::vector<int> fitted;
   for (int i = 0; i < views.count(); ++i)
     if (!packed.views[static_cast<size_t>(i)].held_out) fitted.push_back(i);
+  std::vector<std::string> depth_notes;
   std::vector<std::vector<SeenPoint>> seen =
-      PointsSeenBy(capture, fitted, packed.scene.field_from_world);
+      PointsOfViews(capture, fitted, packed.scene.field_from_world, &depth_notes);
+  for (const std::string& note : depth_notes) console->Info(note);
   for (size_t i = 0; i < fitted.size(); ++i)
     packed.views[static_cast<size_t>(fitted[i])].points = std::move(seen[i]);
   WritePackedCapture(run.out, packed);

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "kernels/base/error.h"
+#include "pipeline/capture/measured_depths.h"
 #include "pipeline/run/fit_kind.h"
 #include "pipeline/run/profile_run.h"
 
@@ -35,8 +36,9 @@ FittedPictures FitPictures(const WorkingViews& views, const StoredField& scene,
   std::vector<Image> pictures;
   pictures.reserve(indices.size());  // pointers to its elements are kept
   std::vector<TrainingView> training_views;
+  std::vector<std::string> said_before;
   std::vector<std::vector<SeenPoint>> seen =
-      PointsSeenBy(views.capture(), indices, scene.field_from_world);
+      PointsOfViews(views.capture(), indices, scene.field_from_world, &said_before);
   int64_t pixels = 0;
   for (size_t k = 0; k < indices.size(); ++k) {
     Image image = picture(indices[k]);

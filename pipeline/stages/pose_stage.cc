@@ -8,6 +8,7 @@
 #include "pipeline/capture/capture_store.h"
 #include "pipeline/capture/colmap_photos.h"
 #include "pipeline/capture/ingest_photos.h"
+#include "pipeline/capture/measured_depths.h"
 #include "pipeline/capture/photo_gains.h"
 #include "pipeline/capture/photo_masks.h"
 #include "pipeline/capture/pose_profile.h"
@@ -80,15 +81,15 @@ std::string MasksOf(const RunContext& context, const CaptureSource& source) {
   return std::filesystem::is_directory(staged) ? staged.string() : "";
 }
 
-// The masks that the poses name, for the photos that were taken.
-std::vector<std::string> MasksByPhoto(const CaptureSource& source,
-                                      const std::vector<StagedPhoto>& photos) {
-  std::vector<std::string> masks;
+// The files that the poses name, for the photos that were taken; or empty texts.
+std::vector<std::string> ByPhoto(const std::map<std::string, std::string>& by_photo,
+                                 const std::vector<StagedPhoto>& photos) {
+  std::vector<std::string> files;
   for (const StagedPhoto& photo : photos) {
-    const auto found = source.masks.find(photo.file);
-    masks.push_back(found == source.masks.end() ? "" : found->second);
+    const auto found = by_photo.find(photo.file);
+    files.push_back(found == by_photo.end() ? "" : found->second);
   }
-  return masks;
+  return files;
 }
 
 StageOutcome FindPoses(RunContext* context, const CaptureSource& source,
@@ -115,6 +116,9 @@ StageOutcome FindPoses(RunContext* context, const CaptureSource& source,
   if (!ingest.summary.empty()) said.push_back(ingest.summary);
   said.insert(said.end(), ingest.notices.begin(), ingest.notices.end());
   for (const std::string& notice : said) context->console->Info(notice);
+
+  // By the names that photos have before the poses give them others.
+  const std::vector<std::string> depth_files = ByPhoto(source.depths, ingest.photos);
 
   StageOutcome outcome;
   PoseStageReport metrics;
@@ -146,12 +150,18 @@ StageOutcome FindPoses(RunContext* context, const CaptureSource& source,
     options.mask_folder = mask_folder;
     const int masks =
         masks_of_photos.empty()
-            ? StageMasks(MasksByPhoto(source, ingest.photos), ingest.photos, mask_folder)
+            ? StageMasks(ByPhoto(source.masks, ingest.photos), ingest.photos, mask_folder)
             : StagePhotoMasks(masks_of_photos, ingest.photos, mask_folder);
     context->console->Info(Counted(masks, "mask") +
                            ": what is black there is neither matched nor fitted");
     metrics.photo_masks = masks;
   }
+  const int depths = StageDepths(depth_files, ingest.photos, source.depth_unit,
+                                 workspace.Path("poses/depths"));
+  if (depths > 0)
+    context->console->Info(Counted(depths, "map") +
+                           " of measured depths: the fit takes them "
+                           "as points");
   if (source.kind == CaptureKind::kPhotos) {
     PoseReport report;
     const auto say_notes = [&] {
@@ -240,6 +250,8 @@ Stage PoseStage(RunContext* context) {
   else
     for (const auto& [photo, mask] : source.masks)
       stage.inputs["photo_masks"][photo] = HashFile(mask);
+  for (const auto& [photo, map] : source.depths) stage.inputs["depths"][photo] = HashFile(map);
+  if (!source.depths.empty()) stage.inputs["depth_unit"] = source.depth_unit;
   if (const JsonValue splats = given.hash(*context); !splats.IsNull())
     stage.inputs["splats"] = splats;
   stage.refuse_changes = true;

@@ -5,6 +5,7 @@
 
 #include "kernels/base/error.h"
 #include "pipeline/capture/capture_store.h"
+#include "pipeline/capture/measured_depths.h"
 #include "pipeline/capture/working_views.h"
 #include "pipeline/fields/field_file.h"
 #include "pipeline/files/text.h"
@@ -109,8 +110,10 @@ StageOutcome Reconstruct(RunContext* context, const JsonValue& inputs,
   std::vector<Image> photos;
   photos.reserve(training.size());
   std::vector<TrainingView> training_views;
+  std::vector<std::string> depth_notes;
   std::vector<std::vector<SeenPoint>> seen =
-      PointsSeenBy(capture, training, scene.field_from_world);
+      PointsOfViews(capture, training, scene.field_from_world, &depth_notes);
+  for (const std::string& note : depth_notes) context->console->Info(note);
   for (size_t f = 0; f < training.size(); ++f) {
     const int i = training[f];
     Image photo = views.PhotoToFit(i);

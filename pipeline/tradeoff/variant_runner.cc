@@ -17,6 +17,7 @@
 #include "kernels/render/field_renderer.h"
 #include "kernels/scene/common_camera.h"
 #include "pipeline/capture/capture_store.h"
+#include "pipeline/capture/measured_depths.h"
 #include "pipeline/capture/working_views.h"
 #include "pipeline/fields/field_file.h"
 #include "pipeline/images/image_file.h"
@@ -175,8 +176,9 @@ const VariantRunner::Photos& VariantRunner::PhotosAt(int size) {
   p.working_views = p.working_views.InField(p.scene.field_from_world, p.scene.ndc);
   const std::vector<int> fitted = p.working_views.Training();
   p.pictures.reserve(fitted.size());
+  std::vector<std::string> said_before;
   std::vector<std::vector<SeenPoint>> seen =
-      PointsSeenBy(p.working_views.capture(), fitted, p.scene.field_from_world);
+      PointsOfViews(p.working_views.capture(), fitted, p.scene.field_from_world, &said_before);
   for (size_t f = 0; f < fitted.size(); ++f) {
     const int i = fitted[f];
     Image picture = p.working_views.PhotoToFit(i);

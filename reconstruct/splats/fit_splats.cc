@@ -121,6 +121,7 @@ class SplatFitter {
     SplatStep step;
     step.photo = PhotoOfStep();
     step.ssim_weight = options_.ssim_weight;
+    step.depth_weight = options_.depth_weight;
     SplatUpdate& update = step.update;
     const float part = static_cast<float>(step_) / Steps();
     const float rate = options_.rate_mean *

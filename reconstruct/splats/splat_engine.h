@@ -18,7 +18,7 @@ namespace regrade {
 
 struct SplatStep {
   int photo = 0;
-  float ssim_weight = 0;
+  float ssim_weight = 0, depth_weight = 0;
   SplatDropout dropout;
   SplatUpdate update;
 };

@@ -44,6 +44,14 @@ class CpuSplatEngine : public SplatEngine {
     const PictureSums sums = Compare(
         width, height, photo.color.data(), photo.masked.empty() ? nullptr : photo.masked.data(),
         picture_.color.data(), step.ssim_weight, &rows_, d_picture_.color.data());
+    if (step.depth_weight > 0) {
+      std::ranges::fill(d_picture_.depth, 0.0f);
+      std::ranges::fill(d_picture_.transmittance, 0.0f);
+      for (const SeenDepth& seen : photo.depths)
+        WriteDepthGradient(seen, std::ssize(photo.depths), step.depth_weight,
+                           {picture_.depth.data(), picture_.transmittance.data()},
+                           {d_picture_.depth.data(), d_picture_.transmittance.data()});
+    }
     SumOverTiles(frame_, d_picture_, &tile_sums_);
     const SplatMoments to{PointersOf(&state_.splats), PointersOf(&state_.first_moment),
                           PointersOf(&state_.second_moment)};

@@ -2,6 +2,7 @@
 #include <utility>
 
 #include "kernels/image/cuda/device_picture_loss.h"
+#include "kernels/splats/cuda/device_seen_depth.h"
 #include "kernels/splats/cuda/device_splat_update.h"
 #include "kernels/splats/rendered_splats.h"
 #include "reconstruct/splats/splat_engine.h"
@@ -12,6 +13,7 @@ namespace {
 struct DevicePhoto {
   DeviceBuffer<uint16_t> color;
   DeviceBuffer<uint8_t> masked;
+  DeviceBuffer<SeenDepth> depths;
 };
 
 class CudaSplatEngine : public SplatEngine {
@@ -31,11 +33,18 @@ class CudaSplatEngine : public SplatEngine {
       own.color = DeviceBuffer<uint16_t>(std::ssize(photo.color), "photos");
       own.color.CopyIn(photo.color.data(), std::ssize(photo.color));
       most = std::max(most, own.color.size());
+      if (!photo.depths.empty()) {
+        own.depths = DeviceBuffer<SeenDepth>(std::ssize(photo.depths), "depths of photos");
+        own.depths.CopyIn(photo.depths.data(), std::ssize(photo.depths));
+      }
       if (photo.masked.empty()) continue;
       own.masked = DeviceBuffer<uint8_t>(std::ssize(photo.masked), "masks");
       own.masked.CopyIn(photo.masked.data(), std::ssize(photo.masked));
     }
-    if (d_picture_.size() < most) d_picture_ = DeviceBuffer<float>(most, "gradient of a photo");
+    if (d_picture_.size() >= most) return;
+    d_picture_ = DeviceBuffer<float>(most, "gradient of a photo");
+    d_depth_ = DeviceBuffer<float>(most / 3, "gradient of depths");
+    d_transmittance_ = DeviceBuffer<float>(most / 3, "gradient of depths");
   }
 
   void SetState(SplatFitState state) override {
@@ -80,11 +89,22 @@ class CudaSplatEngine : public SplatEngine {
     const DevicePhoto& photo = on_device_[static_cast<size_t>(step.photo)];
     SplatOptions options = options_;
     options.dropout = step.dropout;
-    renderer_.Render(splats_.value.view(), camera, options, SplatPass::kColorAdjoint);
+    const bool depths = step.depth_weight > 0 && photo.depths.size() > 0;
+    renderer_.Render(splats_.value.view(), camera, options,
+                     depths ? SplatPass::kAdjoint : SplatPass::kColorAdjoint);
     loss_.Compare(camera.width, camera.height, photo.color.data(), photo.masked.data(),
                   renderer_.pixels().color, step.ssim_weight, d_picture_.data());
     SplatPixels<const float> d{};
     d.color = d_picture_.data();
+    if (depths) {
+      d_depth_.Zero();
+      d_transmittance_.Zero();
+      WriteDepthGradientOnDevice(photo.depths.data(), photo.depths.size(), step.depth_weight,
+                                 {renderer_.pixels().depth, renderer_.pixels().transmittance},
+                                 {d_depth_.data(), d_transmittance_.data()});
+      d.depth = d_depth_.data();
+      d.transmittance = d_transmittance_.data();
+    }
     UpdateSplats(step.update, renderer_.SumPixels(d), splats_, rejected_.data());
     entries_ += renderer_.num_entries();
   }
@@ -109,7 +129,7 @@ class CudaSplatEngine : public SplatEngine {
   SplatOptions options_;
   const SplatPhotos* photos_ = nullptr;
   std::vector<DevicePhoto> on_device_;
-  DeviceBuffer<float> d_picture_;
+  DeviceBuffer<float> d_picture_, d_depth_, d_transmittance_;
   DeviceSplatMoments splats_;
   DeviceSplatRenderer renderer_;
   DevicePictureLoss loss_;

@@ -17,6 +17,7 @@ struct SplatFitOptions {
   int sh_degree = 2;
   float ssim_weight = 0.2f;
   float opacity_weight = 0.03f, scale_weight = 0.03f;
+  float depth_weight = 0.03f;  // see EQ(splat-depth): at the points that COLMAP found
   // Of Adam. That of means is over the cameras' extent, and falls exponentially.
   float rate_mean = 1.6e-4f, rate_mean_end = 1.6e-6f;
   float rate_scale = 5e-3f, rate_quaternion = 1e-3f, rate_opacity = 5e-2f;
@@ -60,6 +61,12 @@ struct SplatFitOptions {
           .constant = true});
     bind("splat-scale-weight", scale_weight,
          {.help = "weight of the mean scale in the loss: larger values leave smaller splats",
+          .min = 0,
+          .max = 10,
+          .constant = true});
+    bind("splat-depth-weight", depth_weight,
+         {.help = "weight in the loss of how far expected depths are from those of COLMAP's "
+                  "points: without it walls may be thin, with what shows behind them",
           .min = 0,
           .max = 10,
           .constant = true});

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <map>
 
 #include "kernels/base/error.h"
 #include "kernels/image/resize.h"
@@ -12,7 +13,7 @@ namespace regrade {
 namespace {
 
 SplatPhoto Stored(const Image& photo, const Camera& camera) {
-  SplatPhoto stored{camera, {}, {}};
+  SplatPhoto stored{camera, {}, {}, {}};
   stored.color.resize(photo.pixels.size());
   std::vector<uint8_t> masked(static_cast<size_t>(photo.num_pixels()));
   for (size_t i = 0; i < stored.color.size(); ++i) {
@@ -25,6 +26,26 @@ SplatPhoto Stored(const Image& photo, const Camera& camera) {
   }
   if (std::ranges::find(masked, 1) != masked.end()) stored.masked = std::move(masked);
   return stored;
+}
+
+// At pixels that show two points, that of the more certain one.
+std::vector<SeenDepth> DepthsOf(const std::vector<SeenPoint>& points, const SplatPhoto& photo) {
+  std::map<int32_t, SeenDepth> best;
+  const Camera& camera = photo.camera;
+  for (const SeenPoint& point : points) {
+    double u, v, z;
+    if (!camera.Project(point.position.Cast<double>(), &u, &v, &z)) continue;
+    if (!(u >= 0 && v >= 0 && u < camera.width && v < camera.height)) continue;
+    const int32_t pixel = static_cast<int32_t>(v) * camera.width + static_cast<int32_t>(u);
+    if (!photo.masked.empty() && photo.masked[static_cast<size_t>(pixel)] != 0) continue;
+    const float depth = static_cast<float>(z);
+    const SeenDepth seen{pixel, depth, std::max(kLeastDepthError, point.sigma / depth)};
+    const auto [at, fresh] = best.emplace(pixel, seen);
+    if (!fresh && seen.error < at->second.error) at->second = seen;
+  }
+  std::vector<SeenDepth> depths;
+  for (const auto& [pixel, seen] : best) depths.push_back(seen);
+  return depths;
 }
 
 }  // namespace
@@ -44,6 +65,7 @@ SplatPhotos::SplatPhotos(const std::vector<TrainingView>& views, double shrink) 
                   Concat("view ", photos_.size(), " has no unmasked pixel to fit"), "",
                   "check its mask");
     photos_.push_back(Stored(photo, view.camera.Undistorted().Resized(width, height)));
+    photos_.back().depths = DepthsOf(view.points, photos_.back());
   }
 }
 

@@ -7,14 +7,16 @@
 #include "kernels/base/vec.h"
 #include "kernels/scene/camera.h"
 #include "kernels/scene/image.h"
+#include "kernels/splats/seen_depth.h"
 #include "reconstruct/fit/training_rays.h"
 
 namespace regrade {
 
 struct SplatPhoto {
-  Camera camera;                // a pinhole
-  std::vector<uint16_t> color;  // [H, W, 3] sRGB
-  std::vector<uint8_t> masked;  // [H, W]: 1 where a pixel is; empty if none is
+  Camera camera;                  // a pinhole
+  std::vector<uint16_t> color;    // [H, W, 3] sRGB
+  std::vector<uint8_t> masked;    // [H, W]: 1 where a pixel is; empty if none is
+  std::vector<SeenDepth> depths;  // of points that the photo saw, at most one a pixel
 };
 
 class SplatPhotos {

@@ -7,6 +7,7 @@
 #include "kernels/base/random.h"
 #include "kernels/image/cuda/device_picture_loss.h"
 #include "kernels/image/picture_loss.h"
+#include "kernels/splats/cuda/device_seen_depth.h"
 #include "kernels/splats/cuda/device_splat_update.h"
 #include "reconstruct/splats/fit_splats.h"
 #include "reconstruct/splats/splat_engine.h"
@@ -68,6 +69,39 @@ TEST_F(DeviceSplatFit, LossIsThatOfTheHost) {
   EXPECT_EQ(loss.TakeSums().values, 0);
 }
 
+TEST_F(DeviceSplatFit, DepthGradientIsThatOfTheHost) {
+  constexpr int kPixels = 1000, kSeen = 300;
+  std::vector<float> z(kPixels), transmittance(kPixels), d_z(kPixels), d_t(kPixels);
+  for (size_t i = 0; i < z.size(); ++i) {
+    z[i] = static_cast<float>(4 * RandomDouble(2, 1, i));
+    transmittance[i] = static_cast<float>(0.1 * RandomDouble(2, 2, i));
+  }
+  std::vector<SeenDepth> seen;
+  for (int i = 0; i < kSeen; ++i)
+    seen.push_back({3 * i, 2 + static_cast<float>(i % 7) * 0.1f, 0.02f * (1 + i % 20)});
+  for (const SeenDepth& one : seen)
+    WriteDepthGradient(one, kSeen, 0.03f, {z.data(), transmittance.data()},
+                       {d_z.data(), d_t.data()});
+  DeviceBuffer<SeenDepth> seen_there(kSeen, "depths");
+  DeviceBuffer<float> z_there(kPixels, "z"), transmittance_there(kPixels, "T"),
+      d_z_there(kPixels, "d_z"), d_t_there(kPixels, "d_T");
+  seen_there.CopyIn(seen.data(), kSeen);
+  z_there.CopyIn(z.data(), kPixels);
+  transmittance_there.CopyIn(transmittance.data(), kPixels);
+  d_z_there.Zero();
+  d_t_there.Zero();
+  WriteDepthGradientOnDevice(seen_there.data(), kSeen, 0.03f,
+                             {z_there.data(), transmittance_there.data()},
+                             {d_z_there.data(), d_t_there.data()});
+  std::vector<float> z_back(kPixels), t_back(kPixels);
+  d_z_there.CopyOut(z_back.data(), kPixels);
+  d_t_there.CopyOut(t_back.data(), kPixels);
+  for (size_t i = 0; i < z.size(); ++i) {
+    EXPECT_NEAR(z_back[i], d_z[i], 1e-5f * std::abs(d_z[i]) + 1e-9f) << i;
+    EXPECT_NEAR(t_back[i], d_t[i], 1e-5f * std::abs(d_t[i]) + 1e-9f) << i;
+  }
+}
+
 TEST_F(DeviceSplatFit, PopulationChangesAsOnTheHost) {
   Splats host = testing::CastSplats<float>(testing::RandomSplats(100, 4, 3));
   PopulationChange change;
@@ -95,6 +129,10 @@ TEST_F(DeviceSplatFit, PopulationChangesAsOnTheHost) {
 // that hardly counts, may go either way: most values agree, and pictures do.
 TEST_F(DeviceSplatFit, StepsAreThoseOfTheHost) {
   fit_.steps = 15;
+  for (TrainingView& view : views_) {  // the ball's point that is nearest to the camera
+    const Vec3d center = view.camera.Center();
+    view.points.push_back({(center * (0.55 / Norm(center))).Cast<float>(), 0.01f});
+  }
   for (const int degree : {1, 3}) {
     fit_.sh_degree = degree;
     std::vector<Image> pictures;

@@ -6,11 +6,14 @@
 #include <cmath>
 #include <set>
 
+#include "kernels/field/spherical_harmonics.h"
 #include "kernels/splats/extent.h"
+#include "kernels/splats/seen_depth.h"
 #include "reconstruct/splats/fit_splats.h"
 #include "reconstruct/splats/population.h"
 #include "reconstruct/splats/relocation.h"
 #include "reconstruct/splats/splat_engine.h"
+#include "reconstruct/splats/splat_photos.h"
 #include "tests/support/ball_views.h"
 #include "tests/support/record_error.h"
 
@@ -195,6 +198,69 @@ TEST(UpdateSplat, ColoursStayWithinTheirBounds) {
     for (size_t k = 0; k < 12; ++k)
       EXPECT_FLOAT_EQ(splats->sh[k] * d[k], k % 4 == 0 ? -std::sqrt(M_PI) : -0.2) << k;
   }
+}
+
+// --- depths
+
+TEST(SeenDepth, GradientIsTheDerivativeInDouble) {
+  const SeenDepth seen{.pixel = 0, .depth = 3, .error = 0.02f};
+  constexpr double kStep = 1e-6;
+  const auto loss = [&seen](double z, double transmittance) {
+    double unused[2];
+    return DepthLoss(seen, 5, z, transmittance, unused, unused + 1);
+  };
+  for (const double z : {0.0, 2.5, 2.96, 3.01, 3.05, 9.0, 300.0})
+    for (const double t : {0.0, 0.01, 0.4}) {
+      double d_z, d_t;
+      EXPECT_GT(DepthLoss(seen, 5, z, t, &d_z, &d_t), 0);
+      EXPECT_NEAR(d_z, (loss(z + kStep, t) - loss(z - kStep, t)) / (2 * kStep), 1e-7) << z;
+      EXPECT_NEAR(d_t, (loss(z, t + kStep) - loss(z, t - kStep)) / (2 * kStep), 1e-7) << z;
+    }
+}
+
+// A thin wall before something far that has its colour, which photos alone cannot tell from an
+// opaque one: with points on the wall the light comes from there.
+TEST(SeenDepth, PointsMakeWallsOpaque) {
+  constexpr int kSide = 24;
+  Image photo(kSide, kSide);
+  std::ranges::fill(photo.pixels, 0.7f);
+  Camera camera;
+  camera.width = camera.height = kSide;
+  camera.fx = camera.fy = camera.cx = camera.cy = kSide / 2;
+  std::vector<SeenPoint> points;
+  for (int y = -2; y <= 2; ++y)
+    for (int x = -2; x <= 2; ++x)
+      points.push_back(
+          {{0.7f * static_cast<float>(x), 0.7f * static_cast<float>(y), 2}, 0.01f});
+  points.push_back({{0, 0, -2}, 0.01f});      // behind the camera
+  points.push_back({{0.01f, 0, 2}, 0.001f});  // in the pixel of another, and more certain
+  const std::vector<TrainingView> views = {{camera, &photo, points}};
+  const SplatPhotos photos(views);
+  ASSERT_EQ(photos[0].depths.size(), 25u);
+  EXPECT_EQ(photos[0].depths[12].error, kLeastDepthError);
+
+  const auto fitted = [&photos, &camera](float depth_weight) {
+    SplatFitState state;
+    state.splats = Splats(2, 1);
+    state.splats.Set(0, {{0, 0, 2}, {1, 1, -4}, {1, 0, 0, 0}, -1});
+    state.splats.Set(1, {{0, 0, 12}, {3, 3, -2}, {1, 0, 0, 0}, 3});
+    for (float& value : state.splats.sh) value = 0.2f / static_cast<float>(kSh0);
+    state.splats.background = {0.7f, 0.7f, 0.7f};
+    state.first_moment = state.second_moment = Splats(2, 1);
+    const auto engine = MakeCpuSplatEngine({});
+    engine->SetPhotos(&photos);
+    engine->SetState(std::move(state));
+    for (int i = 0; i < 200; ++i) {
+      SplatStep step;
+      step.depth_weight = depth_weight;
+      step.update.rates.opacity_logit = 0.05f;
+      step.update.SetStep(static_cast<uint64_t>(i));
+      engine->Step(step);
+    }
+    return engine->Render(camera).depth.at(kSide / 2, kSide / 2)[0];
+  };
+  EXPECT_GT(fitted(0), 6);
+  EXPECT_NEAR(fitted(SplatFitOptions().depth_weight), 2, 0.15);
 }
 
 // --- fits
