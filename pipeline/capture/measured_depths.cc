@@ -63,6 +63,17 @@ double UnitOf(const fs::path& folder) {
   return unit->AsDouble();
 }
 
+// A map that a photo comes with, as it is stored. Throws Error(kInput).
+Image ReadMap(const std::string& path, const StagedPhoto& photo) {
+  const int bits = DecodePhoto(path, {.min_side = 1}).bits;
+  Image map = ReadGivenImage(path);
+  if (map.channels != 1 || bits != 16)
+    throw InputError("has not one channel of 16 bits, as depths have", path,
+                     "write millimetres as 16-bit PNG, 0 where nothing was measured");
+  CheckAspect(map, photo.width, photo.height, path, ExitCode::kInput);
+  return map;
+}
+
 DepthMap ReadStaged(const CaptureView& view) {
   const fs::path path = StagedDepthOf(view.path);
   DepthMap map;
@@ -142,23 +153,30 @@ void AddPoints(const DepthMap& map, const Camera& camera, const Agreement& found
 }  // namespace
 
 int StageDepths(const std::vector<std::string>& maps, const std::vector<StagedPhoto>& photos,
-                double unit, const std::string& folder) {
+                double unit, const std::string& folder, std::vector<std::string>* notes) {
   REGRADE_CHECK_EQ(maps.size(), photos.size());
   fs::remove_all(folder);  // of an earlier run
   int count = 0;
+  std::vector<std::string> left;
   for (size_t i = 0; i < photos.size(); ++i) {
     if (maps[i].empty()) continue;
-    const DecodedPhoto decoded = DecodePhoto(maps[i], {.min_side = 1});
-    const Image given = ReadGivenImage(maps[i]);
-    if (given.channels != 1 || decoded.bits != 16)
-      throw InputError("is no depth map: it has not one channel of 16 bits", maps[i],
-                       "write millimetres as 16-bit PNG, 0 where nothing was measured");
-    CheckAspect(given, photos[i].width, photos[i].height, maps[i], ExitCode::kInput);
-    fs::create_directories(folder);
-    WritePng16(folder + "/" + photos[i].name, given);
-    ++count;
+    try {
+      const Image map = ReadMap(maps[i], photos[i]);
+      fs::create_directories(folder);
+      WritePng16(folder + "/" + photos[i].name, map);
+      ++count;
+    } catch (const Error& error) {
+      if (error.code() != ExitCode::kInput) throw;
+      left.push_back(fs::path(maps[i]).filename().string() + " " + error.what());
+    }
   }
   if (count > 0) WriteJsonFile(folder + "/" + kUnitFile, JsonValue::Object{{"unit", unit}});
+  if (count > 0)
+    notes->push_back(Counted(count, "map") +
+                     " of measured depths: the fit takes them as points");
+  if (!left.empty())
+    notes->push_back(Counted(std::ssize(left), "depth map") + " left out: " + left[0] +
+                     (left.size() > 1 ? ", and so on" : ""));
   return count;
 }
 

@@ -13,10 +13,10 @@ namespace regrade {
 // Writes folder/00007.png for each photo that has a depth map in `maps`: its path, or an empty
 // text; and the maps' unit, in world units of the poses, to folder/unit.json. A map is a PNG of
 // one channel, of any size, with z in camera coordinates in that unit, and 0 where nothing was
-// measured. Returns their number. Throws Error(kInput) for a map of another aspect than its
-// photo, with more channels or with 8 bits.
+// measured. One that cannot be read, has another aspect than its photo, more channels or 8
+// bits is left out. Returns their number. `notes`: what was taken and left, for the user.
 int StageDepths(const std::vector<std::string>& maps, const std::vector<StagedPhoto>& photos,
-                double unit, const std::string& folder);
+                double unit, const std::string& folder, std::vector<std::string>* notes);
 
 // Adds the maps that StageDepths wrote to `folder`, by the photos' names there, and their unit.
 void FindStagedDepths(const std::string& folder, std::map<std::string, std::string>* maps,

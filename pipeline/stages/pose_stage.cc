@@ -156,12 +156,11 @@ StageOutcome FindPoses(RunContext* context, const CaptureSource& source,
                            ": what is black there is neither matched nor fitted");
     metrics.photo_masks = masks;
   }
-  const int depths = StageDepths(depth_files, ingest.photos, source.depth_unit,
-                                 workspace.Path("poses/depths"));
-  if (depths > 0)
-    context->console->Info(Counted(depths, "map") +
-                           " of measured depths: the fit takes them "
-                           "as points");
+  std::vector<std::string> depth_notes;
+  StageDepths(depth_files, ingest.photos, source.depth_unit, workspace.Path("poses/depths"),
+              &depth_notes);
+  for (const std::string& note : depth_notes) context->console->Info(note);
+  metrics.notices.insert(metrics.notices.end(), depth_notes.begin(), depth_notes.end());
   if (source.kind == CaptureKind::kPhotos) {
     PoseReport report;
     const auto say_notes = [&] {

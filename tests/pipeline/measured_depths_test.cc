@@ -12,7 +12,6 @@
 #include "pipeline/capture/capture_source.h"
 #include "pipeline/files/json_file.h"
 #include "pipeline/images/image_file.h"
-#include "tests/support/expect_error.h"
 #include "tests/support/temporary_folder.h"
 
 namespace regrade {
@@ -94,28 +93,42 @@ class MeasuredDepths : public ::testing::Test {
   testing::TemporaryFolder folder_;
   std::vector<StagedPhoto> photos_;
   Capture capture_;
+  std::vector<std::string> staged_notes_;
 };
 
 TEST_F(MeasuredDepths, OnlyMapsOf16BitsAndOneChannelAreTaken) {
-  std::vector<std::string> maps(kDepthViews);
-  maps[1] = folder_ / "maps/eight.png";
+  std::vector<std::string> maps(kDepthViews), notes;
+  const auto stage = [&](double unit) {
+    notes.clear();
+    return StageDepths(maps, photos_, unit, StagedFolder(), &notes);
+  };
+  maps[1] = folder_ / "maps/one.png";
+  const auto expect_left = [&](const std::string& why) {
+    EXPECT_EQ(stage(1), 0);
+    ASSERT_EQ(notes.size(), 1u);
+    EXPECT_TRUE(notes[0].starts_with("1 depth map left out: one.png ")) << notes[0];
+    EXPECT_NE(notes[0].find(why), std::string::npos) << notes[0];
+  };
+  testing::WriteText(maps[1], "no picture");
+  expect_left("");
   WritePng8(maps[1], GreyPicture(32, 24, 1, 0.5f));
-  EXPECT_REGRADE_ERROR(StageDepths(maps, photos_, 1, StagedFolder()), ExitCode::kInput,
-                       "not one channel of 16 bits");
+  expect_left("not one channel of 16 bits");
   WritePng16(maps[1], GreyPicture(32, 24, 3, 0.5f));
-  EXPECT_REGRADE_ERROR(StageDepths(maps, photos_, 1, StagedFolder()), ExitCode::kInput,
-                       "not one channel of 16 bits");
+  expect_left("not one channel of 16 bits");
   WritePng16(maps[1], GreyPicture(24, 24, 1, 0.5f));
-  EXPECT_REGRADE_ERROR(StageDepths(maps, photos_, 1, StagedFolder()), ExitCode::kInput, "");
+  expect_left("");
   WritePng16(maps[1], GreyPicture(32, 24, 1, 0.5f));
-  EXPECT_EQ(StageDepths(maps, photos_, 0.25, StagedFolder()), 1);
+  EXPECT_EQ(stage(0.25), 1);
+  EXPECT_EQ(notes[0], "1 map of measured depths: the fit takes them as points");
   std::map<std::string, std::string> found;
   double unit = 0;
   FindStagedDepths(StagedFolder(), &found, &unit);
   EXPECT_EQ(unit, 0.25);
   ASSERT_EQ(found.size(), 1u);
   EXPECT_EQ(found.begin()->first, "00001.png");
-  EXPECT_EQ(StageDepths(std::vector<std::string>(kDepthViews), photos_, 1, StagedFolder()), 0);
+  maps[1] = "";
+  EXPECT_EQ(stage(1), 0);
+  EXPECT_TRUE(notes.empty());
   EXPECT_FALSE(fs::exists(StagedFolder()));
 }
 
@@ -123,7 +136,8 @@ TEST_F(MeasuredDepths, AnotherUnitIsFoundAndAWrongMapIsLeftOutByName) {
   AddPoints();
   std::vector<std::string> maps;
   for (int v = 0; v < kDepthViews; ++v) maps.push_back(WriteMap(v, 1, v == 2));
-  StageDepths(maps, photos_, 1, StagedFolder());  // millimetres, said to be metres
+  StageDepths(maps, photos_, 1, StagedFolder(),
+              &staged_notes_);  // millimetres, said to be metres
   std::vector<std::string> notes;
   const std::vector<std::vector<SeenPoint>> seen = Points(&notes);
   ASSERT_EQ(notes.size(), 1u);
@@ -151,7 +165,7 @@ TEST_F(MeasuredDepths, AnotherUnitIsFoundAndAWrongMapIsLeftOutByName) {
 TEST_F(MeasuredDepths, WithoutPointsTheUnitIsWhatThePosesSay) {
   std::vector<std::string> maps(kDepthViews);
   maps[3] = WriteMap(3, 1);
-  StageDepths(maps, photos_, 1e-3, StagedFolder());
+  StageDepths(maps, photos_, 1e-3, StagedFolder(), &staged_notes_);
   std::vector<std::string> notes;
   const std::vector<std::vector<SeenPoint>> seen = Points(&notes);
   EXPECT_TRUE(seen[0].empty());
