@@ -60,7 +60,8 @@ StageOutcome PlaceViews(RunContext* context, const ProgressFunction& progress) {
   const std::string photo_folder = workspace.Path("poses/photos"),
                     sparse_folder = workspace.Path("poses/sparse");
   std::filesystem::remove_all(photo_folder);  // of an earlier run
-  std::filesystem::remove_all(workspace.Path("poses/masks"));
+  for (const char* of_photos : {"poses/masks", "poses/depths"})
+    std::filesystem::remove_all(workspace.Path(of_photos));
   workspace.NewPath("poses/photos/x");
   workspace.NewPath("poses/sparse/x");
   const SplatScene scene =

@@ -230,13 +230,13 @@ TEST(SeenDepth, PointsMakeWallsOpaque) {
   std::vector<SeenPoint> points;
   for (int y = -2; y <= 2; ++y)
     for (int x = -2; x <= 2; ++x)
-      points.push_back(
-          {{0.7f * static_cast<float>(x), 0.7f * static_cast<float>(y), 2}, 0.01f});
+      points.push_back({{0.7f * static_cast<float>(x), 0.7f * static_cast<float>(y), 2}, 0.1f});
   points.push_back({{0, 0, -2}, 0.01f});      // behind the camera
   points.push_back({{0.01f, 0, 2}, 0.001f});  // in the pixel of another, and more certain
   const std::vector<TrainingView> views = {{camera, &photo, points}};
   const SplatPhotos photos(views);
   ASSERT_EQ(photos[0].depths.size(), 25u);
+  EXPECT_FLOAT_EQ(photos[0].depths[11].error, 0.05f);
   EXPECT_EQ(photos[0].depths[12].error, kLeastDepthError);
 
   const auto fitted = [&photos, &camera](float depth_weight) {

@@ -1,4 +1,4 @@
-// see EQ(splat-depth), on a CUDA device; see kernels/splats/seen_depth.h.
+// The gradient by depths that a photo saw, on a CUDA device; see EQ(splat-depth).
 #pragma once
 
 #include "kernels/splats/seen_depth.h"
