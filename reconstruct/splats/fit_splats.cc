@@ -121,9 +121,9 @@ class SplatFitter {
     SplatStep step;
     step.photo = PhotoOfStep();
     step.ssim_weight = options_.ssim_weight;
-    step.depth_weight = options_.depth_weight;
     SplatUpdate& update = step.update;
     const float part = static_cast<float>(step_) / Steps();
+    step.depth_weight = options_.depth_weight * std::pow(kDepthFall, part);
     const float rate = options_.rate_mean *
                        std::pow(options_.rate_mean_end / options_.rate_mean, part) * extent_;
     const float fall =
@@ -231,6 +231,7 @@ class SplatFitter {
 
   static constexpr float kUsualSteps = 15000;  // fits of fewer take larger ones
   static constexpr int kWindow = 50;           // steps
+  static constexpr float kDepthFall = 0.01f;   // of the weight of depths, over a fit
   static constexpr double kCheckpointSeconds = 60;
 
   const std::vector<TrainingView>& views_;
