@@ -34,8 +34,7 @@ constexpr StageEntry kStages[] = {
     // poses/ -> field.npz: voxels (reconstruct/fit) or splats (reconstruct/splats) fitted to the
     // photos, whose exposure is undone where they are read (pipeline/capture/working_views.h);
     // the loss is in kernels/field/render_ray.h, its total variation in
-    // kernels/field/cell_variation.h and, of uniform fields, total_variation.h; that of splats
-    // is in kernels/image/picture_loss.h
+    // kernels/field/total_variation.h; that of splats is in kernels/image/picture_loss.h
     {"reconstruct", ReconstructStage},
     // photos + style picture -> views_2d/: each photo styled in 2D (stylize/image)
     {"style_2d", Style2dStage},

@@ -12,8 +12,7 @@
 //   };
 //
 // A member is bool, int, int64_t, uint64_t, float, double, std::string, std::vector<int> (one
-// flag, values separated by commas), std::vector<std::string> (a flag for each value) or
-// std::optional<float>, whose missing value is the text "auto": what suits, found later.
+// flag, values separated by commas) or std::vector<std::string> (a flag for each value).
 #pragma once
 
 #include <limits>

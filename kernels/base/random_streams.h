@@ -8,7 +8,6 @@ namespace regrade {
 // Salts, combined with the seed by XOR (see random.h): each purpose draws independent numbers.
 inline constexpr uint64_t kRandomTotalVariation = 0x7476;     // start of the regularised run
 inline constexpr uint64_t kRandomSphereVariation = 0x6d7369;  // the same for background layers
-inline constexpr uint64_t kRandomFreeSpace = 0x66726565;      // rays of EQ(free-space)
 inline constexpr uint64_t kRandomSplatNoise = 0x73706c;       // of EQ(splat-noise)
 inline constexpr uint64_t kRandomSplatSource = 0x736f75;      // which splats are copied
 inline constexpr uint64_t kRandomSplatViews = 0x766965;       // the order of photos in a fit

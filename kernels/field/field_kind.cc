@@ -4,8 +4,6 @@
 #include <string>
 
 #include "kernels/base/error.h"
-#include "kernels/field/cell_checks.h"
-#include "kernels/field/cell_lattice.h"
 #include "kernels/field/spherical_harmonics.h"
 #include "kernels/field/splat_position.h"
 #include "kernels/field/trilinear.h"
@@ -13,25 +11,7 @@
 namespace regrade {
 namespace {
 
-// A corner or a child out of range would be an access out of bounds. The tree is derived, so it
-// is not checked.
-std::string DefectOfCellField(const Geometry& geometry) {
-  const CellGrid& cells = geometry.cells;
-  const int64_t n = cells.num_cells();
-  const std::string defect = DefectOfCells(cells, geometry.frame.resolution);
-  if (!defect.empty()) return defect;
-  if (cells.corner.size() != 8 * n || cells.num_vertices() != geometry.num_voxels())
-    return Concat(geometry.num_voxels(), " values for cells with ", cells.num_vertices(),
-                  " vertices");
-  for (int64_t i = 0; i < 8 * n; ++i)
-    if (cells.corner[i] < 0 || cells.corner[i] >= cells.num_vertices())
-      return Concat("cell ", i / 8, " has vertex ", cells.corner[i], " of ",
-                    cells.num_vertices());
-  return "";
-}
-
 std::string DefectOfVoxels(const Geometry& geometry) {
-  if (geometry.cells.on()) return DefectOfCellField(geometry);
   const int64_t vertices = geometry.frame.NumVertices();
   if (geometry.links.size() == vertices) return "";
   return Concat(geometry.links.size(), " links for a grid of ", vertices, " vertices");
@@ -42,9 +22,7 @@ void HasVoxels() {}
 void FindVoxels(const Geometry& geometry, const WeightedSample& sample, int32_t* point) {
   if (!sample.on_sphere()) {
     for (int k = 0; k < 8; ++k)
-      point[k] = geometry.cells.on()
-                     ? geometry.cells.corner[8 * int64_t{sample.vertex} + k]
-                     : geometry.links[CornerVertex(geometry.frame, sample.vertex, k)];
+      point[k] = geometry.links[CornerVertex(geometry.frame, sample.vertex, k)];
     return;
   }
   const SphereGeometry& spheres = geometry.spheres;
@@ -64,10 +42,7 @@ void FindVoxels(const Geometry& geometry, const WeightedSample& sample, int32_t*
 Vec3f PositionOfVoxel(const Geometry& geometry, int64_t, int32_t vertex) {
   const Vec3i n = geometry.frame.resolution;
   Vec3f place{0.5f, 0.5f, 0.5f};  // voxels from the box's corner
-  if (geometry.cells.on())
-    place = PlaceOf(geometry.cells.vertex_key[vertex]).Cast<float>();
-  else
-    place += Vec3i{vertex / (n.y * n.z), vertex / n.z % n.y, vertex % n.z}.Cast<float>();
+  place += Vec3i{vertex / (n.y * n.z), vertex / n.z % n.y, vertex % n.z}.Cast<float>();
   Vec3f position;
   for (int a = 0; a < 3; ++a) position[a] = 2 * place[a] / static_cast<float>(n[a]) - 1;
   return position;
@@ -92,8 +67,7 @@ std::string DefectOfSplats(const Geometry& geometry) {
   if (n > INT32_MAX) return Concat(n, " splats, at most ", INT32_MAX, " are supported");
   const bool agree = splats.mean.size() == 3 * n && splats.log_scale.size() == 3 * n &&
                      splats.quaternion.size() == 4 * n && geometry.density.size() == 0 &&
-                     geometry.links.size() == 0 && !geometry.cells.on() &&
-                     !geometry.spheres.on();
+                     geometry.links.size() == 0 && !geometry.spheres.on();
   return agree ? "" : "the sizes of the splats' arrays disagree";
 }
 

@@ -1,5 +1,5 @@
-// What the kinds of fields differ in, where a caller would else ask which one it holds: voxels,
-// on a uniform grid or an adaptive one, or splats.
+// What the kinds of fields differ in, where a caller would else ask which one it holds: voxels
+// or splats.
 #pragma once
 
 #include <cstdint>

@@ -40,7 +40,6 @@ FastGrid MakeFastGrid(const RadianceField& field) {
   const Geometry& geometry = *field.geometry;
   grid.frame = geometry.frame;
   grid.links = geometry.links;
-  grid.shared_cells = {field.geometry, &geometry.cells};
   grid.basis = field.appearance.basis;
   grid.background = field.background;
   grid.near_clip = field.near_clip;
@@ -61,7 +60,6 @@ RadianceField ToRadianceField(const FastGrid& grid) {
   auto geometry = std::make_shared<Geometry>();
   geometry->frame = grid.frame;
   geometry->links = grid.links;
-  geometry->cells = grid.cells();
   const int64_t n = grid.num_voxels();
   const int lanes = grid.lanes();
   geometry->density.Resize(n);
@@ -121,12 +119,6 @@ void RefreshDerived(FastGrid* grid) {
   const Vec3i n = frame.resolution;
   const int lanes = grid->lanes();
   const int64_t voxels = grid->records.size() / lanes;
-  if (grid->links.size() == 0) {  // of cells, of which there may be none
-    grid->vertex_density = Buffer<float>(voxels);
-    for (int64_t v = 0; v < voxels; ++v)
-      grid->vertex_density[v] = grid->records[v * lanes + DensityLane(grid->basis)];
-    return;
-  }
   const int64_t vertices = frame.NumVertices();
   grid->vertex_of_voxel = Buffer<int32_t>(voxels);
   grid->probes = Buffer<Probe>(vertices);

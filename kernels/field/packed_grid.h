@@ -7,8 +7,6 @@
 #pragma once
 
 #include <cstdint>
-#include <memory>
-#include <utility>
 
 #include "kernels/base/buffer.h"
 #include "kernels/field/radiance_field.h"
@@ -46,31 +44,20 @@ struct Probe {
   int32_t link;   // voxel, or -1
 };
 
-// A field in the packed layout, with the arrays derived from it. An adaptive field has cells
-// and no arrays over the box.
+// A field in the packed layout, with the arrays derived from it.
 struct FastGrid {
   GridFrame frame;
-  Buffer<float> vertex_density;  // [N]: densities of an adaptive field, side by side
-  // [N], or empty: factors of the optimizer's rate of each voxel's density, in a fit.
-  Buffer<float> density_rate;
   Buffer<int32_t> links;            // [X, Y, Z]
   Buffer<Probe> probes;             // [X, Y, Z]
   Buffer<uint8_t> brick_distance;   // bricks of kBrick^3 cells, [X, Y, Z / kBrick rounded up]:
                                     // Chebyshev distance in bricks to the nearest brick with a
                                     // stored corner, 0 for such bricks
-  Buffer<int32_t> vertex_of_voxel;  // [N], of a uniform grid
+  Buffer<int32_t> vertex_of_voxel;  // [N]
   Buffer<float> records;            // [N, lanes]
   int basis = 9;
   Vec3f background{0, 0, 0};
   float near_clip = 0;  // world units
   FastSpheres spheres;  // background layers, if any
-
-  // Fields of one geometry share them; a uniform one has none.
-  const CellGrid& cells() const { return *shared_cells; }
-  void SetCells(CellGrid cells) {
-    shared_cells = std::make_shared<const CellGrid>(std::move(cells));
-  }
-  std::shared_ptr<const CellGrid> shared_cells = std::make_shared<const CellGrid>();
 
   Vec3i bricks() const {
     return {(frame.resolution.x + kBrick - 1) / kBrick,
@@ -82,7 +69,7 @@ struct FastGrid {
 };
 
 FastGrid MakeFastGrid(const RadianceField& field);
-// Recomputes the arrays that derive from links or cells and from records.
+// Recomputes the arrays that derive from links and records.
 void RefreshDerived(FastGrid* grid);
 RadianceField ToRadianceField(const FastGrid& grid);
 

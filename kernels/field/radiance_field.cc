@@ -118,7 +118,6 @@ void Validate(const RadianceField& field, const char* name) {
 
 FieldView<float> ViewOf(const RadianceField& field) {
   const SphereGeometry& spheres = field.geometry->spheres;
-  const CellGrid& cells = field.geometry->cells;
   return {field.geometry->frame,
           field.geometry->links.data(),
           field.geometry->density.data(),
@@ -127,8 +126,7 @@ FieldView<float> ViewOf(const RadianceField& field) {
           field.background,
           field.near_clip,
           {spheres.layers, spheres.resolution, spheres.links.data(), spheres.density.data(),
-           field.appearance.sphere_color.data()},
-          cells.on() ? ViewOf(cells, field.geometry->frame.resolution) : CellsView{}};
+           field.appearance.sphere_color.data()}};
 }
 
 }  // namespace regrade

@@ -8,7 +8,6 @@
 
 #include "kernels/base/buffer.h"
 #include "kernels/base/vec.h"
-#include "kernels/field/cell_grid.h"
 #include "kernels/field/grid_frame.h"
 
 namespace regrade {
@@ -40,13 +39,12 @@ struct SplatGeometry {
   bool on() const { return opacity_logit.size() > 0; }
 };
 
-// Records are what has a colour: voxels or splats. A uniform grid has links, one per vertex of
-// the frame; an adaptive field has cells, and its voxels are their vertices; of splats the
-// frame is the box that the cameras look at, without voxels, and some lie outside of it.
+// Records are what has a colour: voxels or splats. A grid has links, one per vertex of the
+// frame; of splats the frame is the box that the cameras look at, without voxels, and some lie
+// outside of it.
 struct Geometry {
   GridFrame frame;
   Buffer<int32_t> links;  // [X, Y, Z]: voxel index, or -1 where nothing is stored
-  CellGrid cells;  // see cell_lattice.h; the frame's resolution is that of the finest level
   Buffer<float> density;  // [N]: per world unit of length; negative means empty (ReLU)
   SphereGeometry spheres;
   SplatGeometry splats;
@@ -96,7 +94,6 @@ struct FieldView {
   Vec3<T> background{};
   T near_clip = 0;
   SpheresView<T> spheres{};
-  CellsView cells{};  // top is null for a uniform grid
 };
 
 FieldView<float> ViewOf(const RadianceField& field);

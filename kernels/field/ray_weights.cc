@@ -5,7 +5,7 @@
 
 #include "kernels/field/background_spheres.h"
 #include "kernels/field/field_kind.h"
-#include "kernels/field/render_cells.h"
+#include "kernels/field/ray_march.h"
 #include "kernels/field/trilinear.h"
 #include "kernels/field/volume_rendering.h"
 
@@ -40,31 +40,10 @@ void MarchSpheres(const Geometry& geometry, const Ray& world_ray, float stop, fl
   }
 }
 
-// The weights of the cells on a ray; returns the transmittance behind them.
-float MarchCellDensity(const Geometry& geometry, const Ray& ray, float stop, float near_clip,
-                       float min_weight, std::vector<WeightedSample>* out) {
-  static thread_local std::vector<CompositedCell<float>> samples;
-  const float transmittance =
-      MarchCells(geometry.frame, ViewOf(geometry.cells, geometry.frame.resolution),
-                 geometry.density.data(), ray, near_clip, stop, &samples);
-  for (const CompositedCell<float>& s : samples) {
-    const float w = s.transmittance_before * Opacity(s.tau);
-    if (w > min_weight) out->push_back({s.place.cell, s.place.fraction, w});
-  }
-  return transmittance;
-}
-
 // RenderRay without colours: the same arithmetic, so that weights agree bit for bit.
 float MarchDensity(const Geometry& geometry, const Ray& ray, const MarchOptions& options,
                    float near_clip, float min_weight, std::vector<WeightedSample>* out) {
   CompositeState<float> state;
-  if (geometry.cells.on()) {
-    state.transmittance =
-        MarchCellDensity(geometry, ray, options.stop_transmittance, near_clip, min_weight, out);
-    if (geometry.spheres.on() && !(state.transmittance < options.stop_transmittance))
-      MarchSpheres(geometry, ray, options.stop_transmittance, min_weight, &state, out);
-    return state.transmittance;
-  }
   const GridFrame& frame = geometry.frame;
   const GridRay<float> march = ClipToGrid(frame, ray, near_clip, options.step);
   const float delta = options.step * march.world_per_voxel;

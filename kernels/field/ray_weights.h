@@ -14,9 +14,8 @@ namespace regrade {
 
 // A sample of the box, or of a background sphere if `vertex` is negative; or a splat.
 struct WeightedSample {
-  int32_t vertex;  // lowest corner of the sample's cell, linear index into links; of an
-                   // adaptive field the cell; a splat; of a sphere ~((x R + y) L + layer), see
-                   // TexelCell
+  int32_t vertex;  // lowest corner of the sample's cell, linear index into links; a splat; of
+                   // a sphere ~((x R + y) L + layer), see TexelCell
   Vec3f fraction;  // trilinear fractions within the cell; bilinear, z = 0, on a sphere; 0 of
                    // splats
   float weight;    // w_i of EQ(composite)

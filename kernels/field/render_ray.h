@@ -13,7 +13,6 @@
 #include "kernels/field/density_losses.h"
 #include "kernels/field/radiance_field.h"
 #include "kernels/field/ray_march.h"
-#include "kernels/field/render_cells.h"
 #include "kernels/field/spherical_harmonics.h"
 #include "kernels/field/trilinear.h"
 #include "kernels/field/volume_rendering.h"
@@ -26,7 +25,7 @@ struct RayResult {
   T transmittance = 1;       // behind the last sample
   T depth = 0;               // sum w t, t in world units along the ray
   T optical_depth = 0;       // sum tau of the box
-  int64_t last_step = -1;    // of a uniform grid: index of the last sample that was composited
+  int64_t last_step = -1;    // index of the last sample of the box that was composited
   SpheresResult<T> spheres;  // contribution of the background's layers, included above
 };
 
@@ -47,7 +46,7 @@ HD Vec3<T> SampleColor(const FieldView<T>& field, const Cell<T>& cell, const T* 
   return color;
 }
 
-// The samples of a uniform grid on a ray, without what is behind them.
+// The samples of the box on a ray, without what is behind them.
 template <typename T>
 HD void CompositeGrid(const FieldView<T>& field, const RayT<T>& ray,
                       const MarchOptions& options, CompositeState<T>* state,
@@ -73,26 +72,12 @@ HD void CompositeGrid(const FieldView<T>& field, const RayT<T>& ray,
   }
 }
 
-// The same of an adaptive field; options.step is not used.
-template <typename T>
-void CompositeCells(const FieldView<T>& field, const RayT<T>& ray, const MarchOptions& options,
-                    CompositeState<T>* state, RayResult<T>* result) {
-  std::vector<CompositedCell<T>> samples;
-  state->transmittance = MarchCells(field.frame, field.cells, field.density, ray,
-                                    field.near_clip, T(options.stop_transmittance), &samples);
-  state->color = ShadeCells(field, ray, samples, &result->depth);
-  for (const CompositedCell<T>& sample : samples) result->optical_depth += sample.tau;
-}
-
 template <typename T>
 HD RayResult<T> RenderRay(const FieldView<T>& field, const RayT<T>& ray,
                           const MarchOptions& options) {
   RayResult<T> result;
   CompositeState<T> state;
-  if (field.cells.top != nullptr)
-    CompositeCells(field, ray, options, &state, &result);
-  else
-    CompositeGrid(field, ray, options, &state, &result);
+  CompositeGrid(field, ray, options, &state, &result);
   if (field.spheres.layers > 0) {
     result.spheres = CompositeSpheres(field.frame, field.spheres, ray,
                                       T(options.stop_transmittance), &state);
@@ -101,23 +86,6 @@ HD RayResult<T> RenderRay(const FieldView<T>& field, const RayT<T>& ray,
   result.transmittance = state.transmittance;
   result.color = state.color + field.background * state.transmittance;
   return result;
-}
-
-// RenderRayAdjoint of an adaptive field.
-template <typename T, typename Add>
-void RenderCellRayAdjoint(const FieldView<T>& field, const RayT<T>& ray,
-                          const MarchOptions& options, const RayResult<T>& result,
-                          const Vec3<T>& d_color, T* d_density, T* d_sh, const Add& add,
-                          T* d_sphere_density, T* d_sphere_color, const DensityLosses& losses) {
-  std::vector<CompositedCell<T>> samples;
-  MarchCells(field.frame, field.cells, field.density, ray, field.near_clip,
-             T(options.stop_transmittance), &samples);
-  Vec3<T> behind = field.background;
-  if (field.spheres.layers > 0)
-    CompositeSpheresAdjoint(field.frame, field.spheres, ray, result.spheres,
-                            result.optical_depth, d_color, &behind, d_sphere_density,
-                            d_sphere_color, add);
-  ShadeCellsAdjoint(field, ray, samples, behind, d_color, d_density, d_sh, add, losses);
 }
 
 // Adds dL/d(density), dL/d(sh) for dL/dC = d_color to the gradients, which have the field's
@@ -131,11 +99,6 @@ HD void RenderRayAdjoint(const FieldView<T>& field, const RayT<T>& ray,
                          T* d_sphere_density = nullptr, T* d_sphere_color = nullptr,
                          const DensityLosses& losses = {}) {
   using std::exp;
-  if (field.cells.top != nullptr) {
-    RenderCellRayAdjoint(field, ray, options, result, d_color, d_density, d_sh, add,
-                         d_sphere_density, d_sphere_color, losses);
-    return;
-  }
   const GridRay<T> march =
       ClipToGrid(field.frame, ray, field.near_clip, static_cast<T>(options.step));
   const T delta = T(options.step) * march.world_per_voxel;

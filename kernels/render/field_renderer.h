@@ -27,9 +27,8 @@ class FieldRenderer {
     return renderer_->RenderWith(*other.renderer_, camera);
   }
 
-  // Prepares the fast renderer: on a GPU a copy of a uniform field in half precision, or room
-  // for the colours of an adaptive field's vertices. Returns why there is none, or an empty
-  // text.
+  // Prepares the fast renderer: on a GPU a copy of a field of voxels in half precision. Returns
+  // why there is none, or an empty text.
   std::string PrepareFast() { return renderer_->PrepareFast(); }
   // Frees that memory.
   void ForgetFast() { renderer_->ForgetFast(); }

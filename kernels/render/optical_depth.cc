@@ -4,7 +4,7 @@
 #include <array>
 #include <cmath>
 
-#include "kernels/field/field_sampler.h"
+#include "kernels/field/trilinear.h"
 #include "kernels/render/render_kind.h"
 #include "kernels/splats/covariance.h"
 #include "kernels/splats/splat_field.h"
@@ -16,14 +16,29 @@ Vec3f Rounded(const Vec3d& v) {
   return {static_cast<float>(v.x), static_cast<float>(v.y), static_cast<float>(v.z)};
 }
 
-// Optical depth of the straight line between two points.
-double DepthBetween(const FieldSampler& sampler, const Vec3d& a, const Vec3d& b, double step) {
+// Of voxels, per world unit of length at a point in world units; 0 outside of the box.
+float DensityAt(const Geometry& geometry, const Vec3f& world) {
+  const GridFrame& frame = geometry.frame;
+  const Vec3f scale = frame.Scale();
+  Vec3f place;  // voxels from the box's lowest corner
+  for (int a = 0; a < 3; ++a) {
+    place[a] = (world[a] - frame.center[a] + frame.radius[a]) * scale[a];
+    if (!(place[a] >= 0 && place[a] <= static_cast<float>(frame.resolution[a]))) return 0;
+  }
+  float density;
+  Interpolate(frame, geometry.links.data(), geometry.density.data(), 1, 1,
+              LocateCell(frame, place - Vec3f{0.5f, 0.5f, 0.5f}), &density);
+  return std::max(density, 0.0f);
+}
+
+// Of a field of voxels: the optical depth of the straight line between two points.
+double DepthBetween(const Geometry& geometry, const Vec3d& a, const Vec3d& b, double step) {
   constexpr int kMost = 4096;
   const double length = Norm(b - a);
   const int samples = std::clamp(static_cast<int>(std::ceil(length / step)), 1, kMost);
   double sum = 0;
   for (int i = 0; i < samples; ++i)
-    sum += static_cast<double>(sampler.DensityAt(Rounded(a + (b - a) * ((i + 0.5) / samples))));
+    sum += double{DensityAt(geometry, Rounded(a + (b - a) * ((i + 0.5) / samples)))};
   return sum * length / samples;
 }
 
@@ -41,12 +56,12 @@ std::vector<double> OpticalDepths(const RadianceField& field, const std::vector<
 
 std::vector<double> VoxelDepthAlong(const RadianceField& field,
                                     const std::vector<Vec3d>& path) {
-  const FieldSampler sampler(*field.geometry);
-  const Vec3f scale = field.geometry->frame.Scale();
+  const Geometry& geometry = *field.geometry;
+  const Vec3f scale = geometry.frame.Scale();
   const double step = 0.5 / std::max({scale.x, scale.y, scale.z});
   std::vector<double> depth;
   for (size_t i = 1; i < path.size(); ++i)
-    depth.push_back(DepthBetween(sampler, path[i - 1], path[i], step));
+    depth.push_back(DepthBetween(geometry, path[i - 1], path[i], step));
   return depth;
 }
 

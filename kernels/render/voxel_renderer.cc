@@ -33,19 +33,15 @@ class VoxelRenderer : public KindRenderer {
   std::string PrepareFast() override {
     if (backend_ == Backend::kCpu) return "";
     try {
-      if (device_.cells.on())
-        colors_ = MakeVertexColors(device_);
-      else
-        half_ = MakeHalfGrid(device_);
+      half_ = MakeHalfGrid(device_);
     } catch (const Error& error) {
       if (error.code() != ExitCode::kResources) throw;
       return "the GPU has no memory for the fast renderer's copy of the field";
     }
-    return half_.empty() && colors_.empty() ? "the fast renderer needs colours of degree 2"
-                                            : "";
+    return half_.empty() ? "the fast renderer needs colours of degree 2" : "";
   }
 
-  void ForgetFast() override { half_ = {}, colors_ = {}; }
+  void ForgetFast() override { half_ = {}; }
 
   RenderedPair RenderFastWith(const KindRenderer& other, const Camera& camera) const override {
     REGRADE_CHECK(camera.lens == LensModel::kPinhole);
@@ -68,10 +64,9 @@ class VoxelRenderer : public KindRenderer {
   }
 
   RenderedView RenderFast(const Camera& camera) const {
-    REGRADE_CHECK(!half_.empty() || !colors_.empty());
-    return RenderViewOnDevice(
-        device_, camera, {march_.step, kFastStop},
-        {.opacity_step = kFastOpacityStep, .half = &half_, .colors = &colors_});
+    REGRADE_CHECK(!half_.empty());
+    return RenderViewOnDevice(device_, camera, {march_.step, kFastStop},
+                              {.opacity_step = kFastOpacityStep, .half = &half_});
   }
 
   Backend backend_;
@@ -79,7 +74,6 @@ class VoxelRenderer : public KindRenderer {
   FastGrid grid_;  // one of the two
   DeviceGrid device_;
   HalfGrid half_;
-  VertexColors colors_;
 };
 
 }  // namespace

@@ -44,10 +44,4 @@ HD Vec3<T> WorldFromNdc(const NdcSpace& space, const Vec3<T>& p) {
   return {p.x * z / T(space.a), p.y * z / T(space.b), z};
 }
 
-// z > 0 in the world.
-template <typename T>
-HD Vec3<T> NdcFromWorld(const NdcSpace& space, const Vec3<T>& p) {
-  return {T(space.a) * p.x / p.z, T(space.b) * p.y / p.z, T(1) - T(2) / p.z};
-}
-
 }  // namespace regrade

@@ -35,18 +35,6 @@ struct PinholeRays {
     if (ndc.on()) NdcRay(ndc, &from, &direction);
     return {from.Cast<float>(), direction.Cast<float>()};
   }
-  // Direction of the ray through a point of the field's space; 0 where no ray has one. The
-  // world point of an NDC point p is z (p.x / a, p.y / b, 1) with 1 / z = (1 - p.z) / 2, and
-  // the direction to it is taken times 1 / z, which is 0 at infinity.
-  HD Vec3f DirectionTo(const Vec3d& p) const {
-    if (!ndc.on()) return Normalized(p - origin).Cast<float>();
-    const double per_z = (1 - p.z) / 2;
-    Vec3d from = origin;
-    Vec3d direction = Normalized(Vec3d{p.x / ndc.a - origin.x * per_z,
-                                       p.y / ndc.b - origin.y * per_z, 1 - origin.z * per_z});
-    NdcRay(ndc, &from, &direction);
-    return direction.Cast<float>();
-  }
 };
 
 }  // namespace regrade

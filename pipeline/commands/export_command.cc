@@ -74,8 +74,6 @@ void RunExport(const Command& command, const Arguments& arguments, Console* cons
                      "add --format ply, or leave it out");
   const bool fields = settings.format == "svox2" || settings.format == "points" ||
                       IsSplatExport(settings.format);
-  if (settings.resolution != 0 && settings.format != "svox2")
-    throw UsageError("is of --format svox2 only", "--resolution");
   if (settings.format == "cube") return ExportLut(settings, folder, console);
   if (fields) return ExportFields(settings, folder, console);
   if (!settings.names.empty())

@@ -2,7 +2,6 @@
 
 #include <filesystem>
 #include <optional>
-#include <utility>
 #include <vector>
 
 #include "kernels/base/error.h"
@@ -12,10 +11,8 @@
 #include "pipeline/commands/page_styles.h"
 #include "pipeline/fields/field_file.h"
 #include "pipeline/fields/surface_points.h"
-#include "pipeline/fields/uniform_field.h"
 #include "pipeline/files/text.h"
 #include "pipeline/program/device_choice.h"
-#include "pipeline/program/memory.h"
 #include "pipeline/run/resolve_settings.h"
 #include "pipeline/stages/splats_of_voxels.h"
 #include "pipeline/stages/styled_field.h"
@@ -26,25 +23,12 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// On a uniform grid.
-void ExportGrid(const ExportOptions& options, const std::string& folder,
-                const std::string& name, StoredField stored, Console* console) {
+void ExportGrid(const ExportOptions& options, const std::string& name,
+                const StoredField& stored, Console* console) {
   const std::string to = options.out + "/" + name + ".npz";
-  const Vec3i own = stored.field.geometry->frame.resolution;
-  const Vec3i n = UniformResolution(stored.field, options.resolution);
-  const std::string grid =
-      Concat("wrote ", to, ": a uniform grid of ", n.x, "x", n.y, "x", n.z);
-  if (!stored.field.geometry->cells.on() && n == own) {
-    WriteFieldFile(to, stored);
-    console->Info(grid);
-    return;
-  }
-  const std::vector<Camera> cameras = ViewsOf(folder, stored, kComparedViews);
-  const std::vector<Image> before = RendersOf(stored.field, cameras);
-  stored.field = ToUniform(stored.field, n, ReadMemoryStatus().available);
   WriteFieldFile(to, stored);
-  stored = {};
-  console->Info(grid + "; " + LossText(before, RendersOf(ReadFieldFile(to).field, cameras)));
+  const Vec3i n = stored.field.geometry->frame.resolution;
+  console->Info(Concat("wrote ", to, ": a grid of ", n.x, "x", n.y, "x", n.z));
 }
 
 void ExportPoints(const ExportOptions& options, const std::string& folder,
@@ -145,20 +129,20 @@ void ExportFields(const ExportOptions& options, const std::string& folder, Conso
   MakeEmptyFolder(options.out, "");
   std::optional<VoxelsAsSplats> fitted;
   if (IsSplatExport(options.format) && !splats) fitted.emplace(folder, options, field, console);
-  const auto write = [&](const std::string& name, StoredField stored) {
+  const auto write = [&](const std::string& name, const StoredField& stored) {
     if (IsSplatExport(options.format))
       ExportSplats(options, folder, name, stored, console);
     else if (options.format == "points")
       ExportPoints(options, folder, name, stored, console);
     else
-      ExportGrid(options, folder, name, std::move(stored), console);
+      ExportGrid(options, name, stored, console);
   };
   if (IsSplatExport(options.format)) WriteCamerasAndTransform(options, folder);
-  if (options.names.empty()) write("field", fitted ? fitted->Scene() : std::move(field));
+  if (options.names.empty()) write("field", fitted ? fitted->Scene() : field);
   for (const std::string& style : styles) {
     StoredField styled = ReadStyledField(folder, StyleFolder(folder, style));
     if (fitted) styled = fitted->Style(style, styled);
-    write(style == "field" ? "field-style" : style, std::move(styled));
+    write(style == "field" ? "field-style" : style, styled);
   }
 }
 

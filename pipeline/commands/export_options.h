@@ -10,7 +10,6 @@ struct ExportOptions {
   std::string out;
   std::string format = "colmap-text";
   std::vector<std::string> names;
-  int resolution = 0;
   float thousands = 500;
   bool thousands_given = false;
   bool dry_run = false;
@@ -25,8 +24,7 @@ struct ExportOptions {
               "compressed-ply write a scene of splats and each style for viewers, editors and "
               "engines: field.EXT and NAME.EXT, cameras.json, and transform.json, which leads "
               "back to the photos' world; a voxel field becomes splats by a fit first. Of "
-              "voxels svox2 "
-              "writes .npz on uniform grids, and "
+              "voxels svox2 writes .npz files that svox2 reads, and "
               "points PLY files of points with colours, approximately on the surfaces. cube "
               "writes one style as a LUT for photo and video editors, to the file --out",
           .choices = "colmap-text|colmap|transforms|ply|spz|glb|compressed-ply|points|svox2|"
@@ -35,12 +33,6 @@ struct ExportOptions {
         "name", names,
         {.help = "only this style, and not the scene as it was; may be given several times. Of "
                  "cube the style, by default the last one"});
-    bind("resolution", resolution,
-         {.unit = "voxels",
-          .help = "of svox2: longest side of the grid. 0 copies a uniform field, and takes the "
-                  "finest level of an adaptive one, up to 512; memory grows with its cube",
-          .min = 0,
-          .max = 1290});
     bind("splats", thousands,
          {.unit = "thousands",
           .help = "most splats that are fitted to voxels",

@@ -8,7 +8,6 @@
 
 #include "kernels/base/error.h"
 #include "kernels/base/half.h"
-#include "kernels/field/cell_checks.h"
 #include "kernels/field/spherical_harmonics.h"
 #include "kernels/scene/camera_checks.h"
 #include "pipeline/files/npz_file.h"
@@ -16,9 +15,8 @@
 namespace regrade {
 namespace {
 
-// The arrays of an adaptive field are unknown to readers of version 1, those of splats to
-// readers of version 2.
-constexpr int32_t kSplatsVersion = 3;
+// A grid of voxels has version 1; version 2 was of cells.
+constexpr int32_t kCellsVersion = 2, kSplatsVersion = 3;
 // Colours have 9 columns a channel, as svox2 has them, or the 16 of splats of degree 3.
 constexpr int kLeastStored = 9;
 constexpr int64_t kSphericalHarmonics = 1;  // svox2's basis_type
@@ -75,6 +73,10 @@ Vec3f ReadVec3(NpzReader* file, const std::string& name) {
 
 void CheckReadable(NpzReader* file) {
   RefuseNewerFormat(file, kSplatsVersion);
+  if (file->Has("regrade_version") &&
+      file->ReadScalar<int32_t>("regrade_version") == kCellsVersion)
+    Refuse(file->path(), "its field has cells, which this version does not read",
+           "run regrade reconstruct again, with --restart-from reconstruct");
   if (file->Has("basis_type")) {
     const NpzArray type = file->Read("basis_type");
     const bool wide = type.type == ArrayType::kI64, narrow = type.type == ArrayType::kI32;
@@ -132,45 +134,11 @@ void ReadSpheres(NpzReader* file, SphereGeometry* spheres, Buffer<float>* color)
   }
 }
 
-// How many rows the values of a geometry have, and why; uniform grids have those of the file.
+// How many rows the values of a geometry have, and why; of voxels the file's values say it.
 struct Rows {
   std::optional<int64_t> count = {};
   std::string reason = {};
 };
-
-// Keys and levels are checked before anything is derived of them: a key outside of the box
-// would be an entry outside of the tree.
-Rows ReadCells(NpzReader* file, Geometry* geometry) {
-  const NpzArray size = file->Read("regrade_cells_size", ArrayType::kI32, {3});
-  const NpzArray keys = file->Read("regrade_cells_key", ArrayType::kU64, {-1});
-  const int64_t n = keys.num_elements();
-  const NpzArray levels = file->Read("regrade_cells_level", ArrayType::kU8, {n});
-  const int32_t* const voxels = size.As<int32_t>();
-  geometry->frame.resolution = {voxels[0], voxels[1], voxels[2]};
-  CellGrid& cells = geometry->cells;
-  cells.finest = file->ReadScalar<int32_t>("regrade_cells_finest");
-  cells.key.Resize(n);
-  std::copy_n(keys.As<CellKey>(), n, cells.key.data());
-  cells.level.Resize(n);
-  std::copy_n(levels.As<uint8_t>(), n, cells.level.data());
-  const std::string defect =
-      n == 0 ? "there are no cells" : DefectOfCells(cells, geometry->frame.resolution);
-  if (!defect.empty())
-    Refuse(file->path() + ": array 'regrade_cells_key'", defect,
-           "the file is damaged: make it again");
-  FindVertices(&cells);
-  BuildTree(geometry->frame.resolution, &cells);
-  return {cells.num_vertices(), Concat("the cells have ", cells.num_vertices(), " vertices")};
-}
-
-void AddCells(const Geometry& geometry, MadeArrays*, NpzWriter* file) {
-  const CellGrid& cells = geometry.cells;
-  file->Add("regrade_cells_size", {3}, &geometry.frame.resolution.x);
-  file->AddScalar<int32_t>("regrade_cells_finest", cells.finest);
-  file->Add("regrade_cells_key", {cells.num_cells()}, cells.key.data(), NpzPacking::kDeflate);
-  file->Add("regrade_cells_level", {cells.num_cells()}, cells.level.data(),
-            NpzPacking::kDeflate);
-}
 
 std::vector<uint16_t> Halves(const Buffer<float>& values) {
   std::vector<uint16_t> halves(static_cast<size_t>(values.size()));
@@ -244,23 +212,17 @@ struct Layout {
   Rows (*read)(NpzReader* file, Geometry* geometry);
   void (*add)(const Geometry& geometry, MadeArrays* made, NpzWriter* file);
 };
-constexpr Layout kUniform{1, true, ReadLinks, AddLinks},
-    kAdaptive{2, true, ReadCells, AddCells},
+constexpr Layout kVoxels{1, true, ReadLinks, AddLinks},
     kSplats{kSplatsVersion, false, ReadSplats, AddSplats};
 
 const Layout& LayoutOf(const Geometry& geometry) {
-  return geometry.splats.on() ? kSplats : geometry.cells.on() ? kAdaptive : kUniform;
+  return geometry.splats.on() ? kSplats : kVoxels;
 }
 
 const Layout& LayoutOf(NpzReader* file) {
-  const bool links = file->Has("links"), cells = file->Has("regrade_cells_key");
-  if (file->Has("regrade_splats_mean")) {
-    if (links || cells) Refuse(file->path(), "a field has voxels or splats, not both");
-    return kSplats;
-  }
-  if (cells && links)
-    Refuse(file->path() + ": array 'links'", "a field has links or cells, not both");
-  return cells ? kAdaptive : kUniform;
+  if (!file->Has("regrade_splats_mean")) return kVoxels;
+  if (file->Has("links")) Refuse(file->path(), "a field has voxels or splats, not both");
+  return kSplats;
 }
 
 void ReadValues(NpzReader* file, const Layout& layout, const Rows& rows, Geometry* geometry,

@@ -10,14 +10,7 @@
 // regrade_field_from_world f64[13] (scale, rotation by rows, translation), regrade_ndc f64[2]
 // where the field is in normalised device coordinates (ndc.h).
 //
-// An adaptive field has no links: in their place are regrade_cells_size i32[3] (voxels of the
-// finest level along the box's axes), regrade_cells_finest i32 (the finest level L),
-// regrade_cells_key u64[C] and regrade_cells_level u8[C] (see cell_lattice.h; cells in the
-// order of their keys). Rows of density_data and sh_data are the cells' corners in the order of
-// their keys, each place once. svox2 does not read such a file; `regrade export --format svox2`
-// makes one that it reads.
-//
-// A field of splats has neither links nor cells nor density_data: in their place are
+// A field of splats has neither links nor density_data: in their place are
 // regrade_splats_mean f32[N,3], regrade_splats_log_scale f16[N,3], regrade_splats_quaternion
 // f16[N,4] (unit length), regrade_splats_opacity_logit f16[N] and regrade_splats_fit_pixel
 // i32, see SplatGeometry; radius and center are those of the box that the cameras look at.
@@ -42,7 +35,7 @@ struct StoredField {
 // largest half), and so are splats but for their means: read the file back before using the
 // field further, so that every stage gets the values that a later run would get. Equal fields
 // give equal bytes. Needs a few megabytes of memory besides the field, of splats 16 B a splat.
-// A uniform grid's regrade_version is 1, an adaptive field's 2, that of splats 3.
+// regrade_version is 1 of voxels and 3 of splats.
 // Throws Error(kResources).
 void WriteFieldFile(const std::string& path, const StoredField& stored);
 
@@ -52,10 +45,7 @@ void RoundAsStored(Appearance* appearance);
 // Reads our files and svox2's (with its older key `data` and links below -1, too). A field of
 // svox2 gets a white background, svox2's default: its file has no entry for it. Throws
 // Error(kInput) for files that are damaged, larger than `budget` bytes, from a newer version of
-// this program, or not renderable (learned bases). The field has passed Validate. An adaptive
-// field of V vertices and C cells takes 116 B a vertex and 41 B a cell, with its tree about 46
-// B; besides, its vertices are found with 128 B a cell, and then its colours are read with 54 B
-// a vertex.
+// this program, or not renderable (learned bases). The field has passed Validate.
 StoredField ReadFieldFile(const std::string& path, uint64_t budget = uint64_t{64} << 30);
 
 }  // namespace regrade

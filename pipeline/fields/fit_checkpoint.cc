@@ -1,20 +1,13 @@
 #include "pipeline/fields/fit_checkpoint.h"
 
-#include "kernels/field/cell_checks.h"
-
 namespace regrade {
 namespace {
 
-// Of a uniform grid's state, and of one with cells in place of links.
-constexpr uint32_t kUniformCheckpoint = 2, kCellsCheckpoint = 3;
+constexpr uint32_t kCheckpointVersion = 2;
 
 bool Consistent(const FastGrid& grid) {
   if (grid.basis != 1 && grid.basis != 4 && grid.basis != 9) return false;
   const int64_t voxels = grid.records.size() / grid.lanes();
-  if (grid.density_rate.size() != 0 && grid.density_rate.size() != voxels) return false;
-  if (grid.cells().on())
-    return grid.links.size() == 0 && grid.cells().num_vertices() == voxels &&
-           grid.records.size() == voxels * grid.lanes();
   for (int a = 0; a < 3; ++a)
     if (grid.frame.resolution[a] < 2 || grid.frame.resolution[a] > 1 << 14) return false;
   if (grid.links.size() != grid.frame.NumVertices() ||
@@ -35,28 +28,6 @@ bool Consistent(const FastSpheres& spheres) {
   const int64_t columns = spheres.num_texels() / spheres.layers;
   for (const int32_t link : spheres.links)
     if (link < -1 || link >= columns) return false;
-  return true;
-}
-
-void PackCells(const FastGrid& grid, BytePacker* packer) {
-  packer->Value(grid.cells().finest);
-  packer->Reference(grid.cells().key);
-  packer->Reference(grid.cells().level);
-  packer->Reference(grid.density_rate);
-}
-
-// Vertices and tree are found again, if keys and levels are those of cells.
-bool UnpackCells(ByteUnpacker* unpacker, FastGrid* grid) {
-  CellGrid cells;
-  unpacker->Value(&cells.finest);
-  unpacker->Values(&cells.key);
-  unpacker->Values(&cells.level);
-  unpacker->Values(&grid->density_rate);
-  if (!unpacker->ok() || !cells.on() || !DefectOfCells(cells, grid->frame.resolution).empty())
-    return false;
-  FindVertices(&cells);
-  BuildTree(grid->frame.resolution, &cells);
-  grid->SetCells(std::move(cells));
   return true;
 }
 
@@ -97,7 +68,7 @@ void UnpackTally(ByteUnpacker* unpacker, FitTally* tally) {
 BytePacker PackFitState(const FitState& state, const std::string& note) {
   const FastGrid& grid = state.grid;
   BytePacker packer;
-  packer.Value(grid.cells().on() ? kCellsCheckpoint : kUniformCheckpoint);
+  packer.Value(kCheckpointVersion);
   packer.Values(note);
   packer.Value(grid.basis);
   packer.Value(state.stage);
@@ -111,7 +82,6 @@ BytePacker PackFitState(const FitState& state, const std::string& note) {
   packer.Value(grid.near_clip);
   PackTally(state.tally, &packer);
   packer.Reference(grid.links);
-  if (grid.cells().on()) PackCells(grid, &packer);
   packer.Reference(grid.records);
   packer.Reference(state.second_moment);
   if (!grid.spheres.on()) return packer;
@@ -129,7 +99,7 @@ std::optional<FitState> UnpackFitState(std::string_view bytes, std::string* note
   FastGrid& grid = state.grid;
   uint32_t version = 0;
   unpacker.Value(&version);
-  if (version != kUniformCheckpoint && version != kCellsCheckpoint) return std::nullopt;
+  if (version != kCheckpointVersion) return std::nullopt;
   std::string unwanted;
   unpacker.Values(note != nullptr ? note : &unwanted);
   unpacker.Value(&grid.basis);
@@ -144,7 +114,6 @@ std::optional<FitState> UnpackFitState(std::string_view bytes, std::string* note
   unpacker.Value(&grid.near_clip);
   UnpackTally(&unpacker, &state.tally);
   unpacker.Values(&grid.links);
-  if (version == kCellsCheckpoint && !UnpackCells(&unpacker, &grid)) return std::nullopt;
   unpacker.Values(&grid.records);
   unpacker.Values(&state.second_moment);
   if (unpacker.ok() && !unpacker.at_end()) {

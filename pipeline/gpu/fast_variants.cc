@@ -26,7 +26,7 @@ constexpr double kMostDb = 200;
 
 struct Variant {
   const char* name;
-  bool copy;  // a uniform field in half precision, or colours of an adaptive field's vertices
+  bool half;  // the copy in half precision
   float stop, opacity_step;
   std::vector<double> views_db = {}, film_db = {};  // before rounding to 8 bits
   std::vector<double> kernel_ms = {};               // from the camera to pixels on the device
@@ -34,14 +34,8 @@ struct Variant {
 };
 
 // The first one is exact, the second one the film's.
-std::vector<Variant> Variants(bool adaptive) {
+std::vector<Variant> Variants() {
   const float exact = MarchOptions().stop_transmittance;
-  if (adaptive)
-    return {{"exact", false, exact, 0},
-            {"fast", true, kFastStop, 0},
-            {"vertex colours", true, exact, 0},
-            {"stop 1e-3", false, 1e-3f, 0},
-            {"vertex colours, stop 1e-2", true, 1e-2f, 0}};
   return {{"exact", false, exact, 0},
           {"fast", true, kFastStop, kFastOpacityStep},
           {"half", true, exact, 0},
@@ -62,11 +56,8 @@ int64_t Bytes(const DeviceBuffer<T>& buffer) {
   return buffer.size() * static_cast<int64_t>(sizeof(T));
 }
 int64_t Bytes(const DeviceGrid& grid) {
-  const DeviceCells& cells = grid.cells;
   return Bytes(grid.links) + Bytes(grid.dense_density) + Bytes(grid.empty_distance) +
-         Bytes(grid.vertex_of_voxel) + Bytes(grid.records) + Bytes(cells.key) +
-         Bytes(cells.level) + Bytes(cells.corner) + Bytes(cells.vertex_key) + Bytes(cells.top) +
-         Bytes(cells.nodes);
+         Bytes(grid.vertex_of_voxel) + Bytes(grid.records);
 }
 int64_t Bytes(const HalfGrid& half) {
   return Bytes(half.links) + Bytes(half.density_pairs) + Bytes(half.empty_distance) +
@@ -82,11 +73,7 @@ double Quantile(std::vector<double> values, double fraction) {
 class Comparison {
  public:
   Comparison(const DeviceGrid& grid, float step)
-      : grid_(grid),
-        half_(MakeHalfGrid(grid)),
-        colors_(grid.cells.on() ? MakeVertexColors(grid) : VertexColors()),
-        step_(step),
-        variants_(Variants(grid.cells.on())) {}
+      : grid_(grid), half_(MakeHalfGrid(grid)), step_(step), variants_(Variants()) {}
 
   void AddView(const Camera& camera) { Add(camera, &Variant::views_db, ""); }
   // `folder`: for pictures exact/`picture` and fast/`picture`; empty: none.
@@ -98,7 +85,7 @@ class Comparison {
     JsonValue::Array rows;
     for (const Variant& variant : variants_)
       rows.push_back(JsonValue::Object{{"name", variant.name},
-                                       {copy_name(), variant.copy},
+                                       {"half", variant.half},
                                        {"stop", variant.stop},
                                        {"opacity_step", variant.opacity_step},
                                        {"views_db_min", Quantile(variant.views_db, 0)},
@@ -110,7 +97,7 @@ class Comparison {
     return JsonValue::Object{{"views", static_cast<int64_t>(variants_[0].views_db.size())},
                              {"film_frames", static_cast<int64_t>(variants_[0].film_db.size())},
                              {"grid_bytes", Bytes(grid_)},
-                             {"copy_bytes", Bytes(half_) + Bytes(colors_.values)},
+                             {"copy_bytes", Bytes(half_)},
                              {"least_db_of_fast", LeastOfFast()},
                              {"renderers", std::move(rows)}};
   }
@@ -119,11 +106,8 @@ class Comparison {
   double LeastOfFast() const {
     return std::min(Quantile(variants_[1].views_db, 0), Quantile(variants_[1].film_db, 0));
   }
-  const char* copy_name() const { return grid_.cells.on() ? "vertex_colors" : "half"; }
   FastFrames FastOf(const Variant& variant) const {
-    FastFrames fast{.opacity_step = variant.opacity_step};
-    if (variant.copy) fast.half = &half_, fast.colors = &colors_;
-    return fast;
+    return {.opacity_step = variant.opacity_step, .half = variant.half ? &half_ : nullptr};
   }
   void TimeKernel(const Camera& camera, Variant* variant) {
     const int64_t n = int64_t{camera.width} * camera.height;
@@ -161,7 +145,6 @@ class Comparison {
 
   const DeviceGrid& grid_;
   HalfGrid half_;
-  VertexColors colors_;
   float step_;
   std::vector<Variant> variants_;
   int turn_ = 0;

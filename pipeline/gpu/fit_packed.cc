@@ -71,8 +71,6 @@ std::string ChoosePaper(const FitPackedOptions& settings, const PackedCapture& c
                      "pack it with --preset paper and the same --paper-config");
   const PaperChoice choice = ChoosePaperConfig(settings.paper_config, {syn, llff});
   ApplyPaperChoice(choice, bound);
-  CheckPaper(settings.preset, settings.paper_config,
-             bound->Values().At("fit-field").AsString());
   return choice.name;
 }
 
@@ -83,15 +81,10 @@ FitOptions OptionsForCapture(const FitPackedOptions& settings, const FitOptions&
   int64_t pixels = 0;
   for (const PackedView& view : capture.views)
     if (!view.held_out) pixels += view.photo.num_pixels();
-  const SceneBox& box = capture.scene.box;
-  const FitOptions adapted = AdaptOptions(
-      asked,
-      {capture.scene.ndc.on(), backend == Backend::kCuda, pixels, box.background.has_value()});
-  if (const std::string note = NoteOfAdapting(asked, adapted); !note.empty())
-    std::fprintf(stderr, "%s\n", note.c_str());
+  const FitOptions adapted = AdaptOptions(asked, {backend == Backend::kCuda, pixels});
   PlannedFit fit = FitWithinMemory(adapted, {.backend = backend,
                                              .pixels = pixels,
-                                             .box = box,
+                                             .box = capture.scene.box,
                                              .max_memory_gb = settings.max_memory_gb,
                                              .reproducible = settings.reproducible});
   if (!fit.notice.empty()) std::fprintf(stderr, "%s\n", fit.notice.c_str());
@@ -175,7 +168,7 @@ void FitPacked(const FitPackedOptions& settings, const FitOptions& fit_options,
   if (hooks.keep_field) {
     WriteFieldFile(settings.out,
                    {fit.field, capture.scene.field_from_world, capture.scene.ndc});
-    if (backend == Backend::kCuda && !fit.field.geometry->cells.on()) {
+    if (backend == Backend::kCuda) {
       const DeviceGrid grid = UploadGrid(MakeFastGrid(fit.field));
       render = RenderCosts(grid, capture, options.step);
     }

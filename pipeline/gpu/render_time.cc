@@ -35,16 +35,12 @@ double RenderMilliseconds(const DeviceGrid& grid, const PackedCapture& capture,
 
 namespace {
 
-// `copy`: a uniform field in half precision, or colours of an adaptive field's vertices.
 struct Setting {
   float stop, opacity_step, step;
-  bool copy;
+  bool half;  // the copy in half precision
 };
 
-std::vector<Setting> SettingsOf(const DeviceGrid& grid, float step) {
-  if (grid.cells.on())
-    return {{1e-4f, 0, step, false}, {1e-3f, 0, step, false}, {1e-2f, 0, step, false},
-            {1e-4f, 0, step, true},  {1e-3f, 0, step, true},  {1e-2f, 0, step, true}};
+std::vector<Setting> SettingsOf(float step) {
   const float coarse = 2 * step;
   return {{1e-4f, 0, step, false},          {1e-3f, 0, step, false},
           {1e-2f, 0, step, false},          {1e-3f, 1.0f / 256, step, false},
@@ -59,15 +55,13 @@ std::vector<Setting> SettingsOf(const DeviceGrid& grid, float step) {
 }  // namespace
 
 JsonValue RenderCosts(const DeviceGrid& grid, const PackedCapture& capture, float step) {
-  const bool adaptive = grid.cells.on();
   const HalfGrid half = MakeHalfGrid(grid);
-  const VertexColors colors = adaptive ? MakeVertexColors(grid) : VertexColors();
   std::vector<Image> exact;
   JsonValue::Array rows;
-  for (const Setting& setting : SettingsOf(grid, step)) {
+  for (const Setting& setting : SettingsOf(step)) {
     const MarchOptions march{setting.step, setting.stop};
-    FastFrames fast{.opacity_step = setting.opacity_step};
-    if (setting.copy) fast.half = &half, fast.colors = &colors;
+    const FastFrames fast{.opacity_step = setting.opacity_step,
+                          .half = setting.half ? &half : nullptr};
     std::vector<double> against_exact, against_photo, ssim, detail_kept;
     size_t index = 0;
     for (const PackedView& view : capture.views) {
@@ -83,7 +77,7 @@ JsonValue RenderCosts(const DeviceGrid& grid, const PackedCapture& capture, floa
         JsonValue::Object{{"stop", setting.stop},
                           {"opacity_step", setting.opacity_step},
                           {"step", setting.step},
-                          {adaptive ? "vertex_colors" : "half", setting.copy},
+                          {"half", setting.half},
                           {"ms", RenderMilliseconds(grid, capture, march, fast)},
                           {"db_against_first", rows.empty() ? 0.0 : Median(against_exact)},
                           {"db_against_photos", Median(against_photo)},

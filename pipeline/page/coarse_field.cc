@@ -6,15 +6,13 @@
 #include <set>
 #include <vector>
 
-#include "kernels/field/cell_lattice.h"
-
 namespace regrade {
 namespace {
 
 // Less than this optical depth across a coarse voxel is left out.
 constexpr double kLeastDepth = 0.01;
 
-// Sums over what lies in each coarse voxel: density times volume, and that times colours.
+// Sums over the voxels in each coarse voxel: of densities, and of densities times colours.
 class Sums {
  public:
   // `width`: of a coarse voxel, a power of two of the field's voxels.
@@ -24,18 +22,11 @@ class Sums {
                 static_cast<size_t>(size_.z));
   }
 
-  // A cube of the field, `side` voxels wide: it is in one coarse voxel or fills some.
-  void Add(const Vec3i& low, int side, double density, const Vec3d& color) {
-    const int count = std::max(1, side / width_);
-    const double volume = std::pow(std::min(side, width_), 3);
-    for (int k = 0; k < count * count * count; ++k) {
-      const Vec3i at{low.x / width_ + k / (count * count), low.y / width_ + k / count % count,
-                     low.z / width_ + k % count};
-      Sum& sum = sum_[Index(at)];
-      sum.density += static_cast<float>(density * volume);
-      for (int c = 0; c < 3; ++c)
-        sum.color[c] += static_cast<float>(density * volume * color[c]);
-    }
+  // A voxel of the field.
+  void Add(const Vec3i& at, double density, const Vec3d& color) {
+    Sum& sum = sum_[Index({at.x / width_, at.y / width_, at.z / width_})];
+    sum.density += static_cast<float>(density);
+    for (int c = 0; c < 3; ++c) sum.color[c] += static_cast<float>(density * color[c]);
   }
   const Vec3i& size() const { return size_; }
   int width() const { return width_; }
@@ -73,44 +64,7 @@ class Sums {
 struct Mean {
   double density = 0;
   Vec3d color{};
-
-  void Add(const RadianceField& field, int64_t voxel) {
-    const double own = std::max(0.0, double{field.geometry->density[voxel]});
-    const float* const sh = field.appearance.sh.data() + voxel * field.appearance.stride();
-    density += own;
-    for (int c = 0; c < 3; ++c) color[c] += own * double{sh[c * field.appearance.basis]};
-  }
 };
-
-// Mean of what a ray meets in a cell: densities between the corners are blends, and those below
-// zero are empty. In the middles of the cell's eight parts.
-double MeanDensity(const float* corner) {
-  double sum = 0;
-  for (int part = 0; part < 8; ++part) {
-    double density = 0;
-    for (int k = 0; k < 8; ++k) {
-      const int apart = __builtin_popcount(static_cast<unsigned>(part ^ k));
-      density += double{corner[k]} * std::pow(0.75, 3 - apart) * std::pow(0.25, apart);
-    }
-    sum += std::max(density, 0.0);
-  }
-  return sum / 8;
-}
-
-void AddCells(const RadianceField& field, Sums* sums) {
-  const CellGrid& cells = field.geometry->cells;
-  for (int64_t i = 0; i < cells.num_cells(); ++i) {
-    Mean mean;
-    float corner[8];
-    for (int k = 0; k < 8; ++k) {
-      mean.Add(field, cells.corner[8 * i + k]);
-      corner[k] = field.geometry->density[cells.corner[8 * i + k]];
-    }
-    if (mean.density > 0)
-      sums->Add(PlaceOf(cells.key[i]), 1 << (cells.finest - cells.level[i]),
-                MeanDensity(corner), mean.color / mean.density);
-  }
-}
 
 void AddGrid(const RadianceField& field, Sums* sums) {
   const Geometry& geometry = *field.geometry;
@@ -119,9 +73,12 @@ void AddGrid(const RadianceField& field, Sums* sums) {
     for (int y = 0; y < size.y; ++y)
       for (int z = 0; z < size.z; ++z) {
         const int32_t voxel = geometry.links[geometry.frame.Vertex(x, y, z)];
-        Mean mean;
-        if (voxel >= 0) mean.Add(field, voxel);
-        if (mean.density > 0) sums->Add({x, y, z}, 1, mean.density, mean.color / mean.density);
+        if (voxel < 0 || !(geometry.density[voxel] > 0)) continue;
+        const float* const sh =
+            field.appearance.sh.data() + int64_t{voxel} * field.appearance.stride();
+        const int basis = field.appearance.basis;
+        sums->Add({x, y, z}, double{geometry.density[voxel]},
+                  {double{sh[0]}, double{sh[basis]}, double{sh[2 * basis]}});
       }
 }
 
@@ -207,7 +164,7 @@ std::optional<RadianceField> CoarseField(const RadianceField& field,
   for (int width = 2; width <= longest / 4; width *= 2) {
     if (longest / width > options.longest) continue;
     Sums sums(voxels, width);
-    geometry.cells.on() ? AddCells(field, &sums) : AddGrid(field, &sums);
+    AddGrid(field, &sums);
     if (std::optional<RadianceField> coarse = FieldOf(field, sums, most)) return coarse;
   }
   return std::nullopt;

@@ -1,4 +1,4 @@
-// The order of a uniform grid's voxels: brick by brick.
+// The order of a grid's voxels: brick by brick.
 #include <algorithm>
 
 #include "kernels/base/error.h"
@@ -75,7 +75,7 @@ PageOrder OrderOfMask(std::string_view mask, const Vec3i& voxels) {
   const Vec3i bricks = BricksOf(voxels);
   int64_t count = 1;
   for (int a = 0; a < 3; ++a) {
-    if (voxels[a] < 2 || voxels[a] > kMaxLattice)
+    if (voxels[a] < 2 || voxels[a] > kMaxPageSide)
       throw InputError("the size of the grid is not valid");
     count *= bricks[a];
     if (count > kMaxBricks) throw InputError("the grid has too many bricks");
@@ -119,7 +119,6 @@ PageOrder OrderOfMask(std::string_view mask, const Vec3i& voxels) {
     next += kBrickBytes;
   });
   if (next != mask.size()) throw InputError("bytes follow the mask of voxels");
-  order.width_log2.assign(order.place.size(), 0);
   return order;
 }
 

@@ -7,7 +7,6 @@
 #include <utility>
 
 #include "kernels/base/error.h"
-#include "kernels/field/field_seen_by.h"
 #include "kernels/field/pad_sh_basis.h"
 #include "kernels/image/color_statistics.h"
 #include "kernels/image/resize.h"
@@ -80,10 +79,7 @@ Image RenderHome(const RadianceField& field, const Camera& home) {
   const double scale = std::min(1.0, double{kPoster} / std::max(home.width, home.height));
   const Camera camera = home.Resized(std::max(1, static_cast<int>(home.width * scale)),
                                      std::max(1, static_cast<int>(home.height * scale)));
-  return FieldRenderer(field.geometry->cells.on() ? FieldSeenBy(field, camera) : field,
-                       Backend::kCpu)
-      .Render(camera)
-      .color;
+  return FieldRenderer(field, Backend::kCpu).Render(camera).color;
 }
 
 void AddPhotos(const WorkingViews& views, bool named, PageContent* content) {

@@ -117,7 +117,6 @@ PageField EncodeSplats(const RadianceField& any, double step) {
        JsonValue::Array{frame.resolution.x, frame.resolution.y, frame.resolution.z}},
       {"center", ArrayOf(frame.center)},
       {"radius", ArrayOf(frame.radius)},
-      {"finest", JsonValue()},
       {"basis", basis},
       {"background", ArrayOf(field.background)},
       {"near", double{field.near_clip}},
@@ -151,7 +150,7 @@ RadianceField DecodeSplats(const PageField& page) {
   ReadBox(header, &geometry->frame);
   const Vec3f resolution = Vec3At(header, "resolution");
   for (int a = 0; a < 3; ++a) {
-    if (!(resolution[a] >= 0 && resolution[a] <= kMaxLattice))
+    if (!(resolution[a] >= 0 && resolution[a] <= kMaxPageSide))
       throw InputError("the resolution is not valid", "page");
     geometry->frame.resolution[a] = static_cast<int>(resolution[a]);
   }

@@ -6,6 +6,7 @@
 #include <tuple>
 
 #include "kernels/base/error.h"
+#include "kernels/base/morton.h"
 #include "kernels/splats/extent.h"
 #include "pipeline/page/value_codec.h"
 
@@ -19,18 +20,9 @@ int16_t RoundedNumber(double value) {
   return static_cast<int16_t>(std::floor(std::clamp(value, -most, most) + 0.5));
 }
 
-// Bits of a coordinate, each three places from the next.
-uint64_t Spread(uint64_t v) {
-  uint64_t spread = 0;
-  for (int bit = 0; bit < 15; ++bit) spread |= (v >> bit & 1) << (3 * bit);
-  return spread;
-}
-
 uint64_t Morton(const SplatNumbers& numbers) {
-  uint64_t key = 0;
-  for (size_t a = 0; a < 3; ++a)
-    key |= Spread(static_cast<uint64_t>(numbers[a] + kMaxNumber + 1)) << (2 - a);
-  return key;
+  constexpr int kBegin = kMaxNumber + 1;
+  return KeyOf({numbers[0] + kBegin, numbers[1] + kBegin, numbers[2] + kBegin});
 }
 
 double Contribution(const SplatNumbers& numbers) {

@@ -26,9 +26,9 @@ std::string PackNumbers(const std::vector<int16_t>& number, int channels,
 std::vector<int16_t> UnpackNumbers(std::string_view bytes, int channels,
                                    const std::vector<EarlierVoxels>& earlier);
 
-// EQ(page-density): q = sign(sigma) round(sqrt(|sigma| w / tau)), w the width of the widest
-// cell around the voxel and tau = kPageOpticalDepth. Photon noise grows as the square root; so
-// does the error that a cell's opacity may have where many cells share a ray.
+// EQ(page-density): q = sign(sigma) round(sqrt(|sigma| w / tau)), w the width of a voxel and
+// tau = kPageOpticalDepth. Photon noise grows as the square root; so does the error that a
+// sample's opacity may have where many samples share a ray.
 inline constexpr double kPageOpticalDepth = 4e-4;
 int16_t DensityNumber(double density, double width);
 double DensityOfNumber(int16_t number, double width);

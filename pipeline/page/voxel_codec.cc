@@ -141,32 +141,8 @@ void DecodeSpheres(const PageField& page, Geometry* geometry, Buffer<float>* col
 std::vector<int64_t> VoxelsOf(const Geometry& geometry, const PageOrder& order) {
   std::vector<int64_t> voxel;
   for (const Vec3i& place : order.place)
-    voxel.push_back(geometry.cells.on()
-                        ? FindKey(geometry.cells.vertex_key, KeyOf(place))
-                        : geometry.links[geometry.frame.Vertex(place.x, place.y, place.z)]);
+    voxel.push_back(geometry.links[geometry.frame.Vertex(place.x, place.y, place.z)]);
   return voxel;
-}
-
-PageOrder OrderOf(const Geometry& geometry, const std::string& places) {
-  const Vec3i& voxels = geometry.frame.resolution;
-  return geometry.cells.on() ? OrderOfTree(places, voxels, geometry.cells.finest)
-                             : OrderOfMask(places, voxels);
-}
-
-void MakeCells(const PageOrder& order, int finest, Geometry* geometry) {
-  CellGrid& cells = geometry->cells;
-  cells.finest = finest;
-  std::vector<std::pair<CellKey, int>> found;
-  for (const PageCell& cell : order.cells) found.emplace_back(KeyOf(cell.low), cell.level);
-  std::sort(found.begin(), found.end());
-  cells.key.Resize(static_cast<int64_t>(found.size()));
-  cells.level.Resize(cells.key.size());
-  for (int64_t i = 0; i < cells.key.size(); ++i) {
-    cells.key[i] = found[static_cast<size_t>(i)].first;
-    cells.level[i] = static_cast<uint8_t>(found[static_cast<size_t>(i)].second);
-  }
-  FindVertices(&cells);
-  BuildTree(geometry->frame.resolution, &cells);
 }
 
 void MakeLinks(const PageOrder& order, Geometry* geometry) {
@@ -182,7 +158,7 @@ void MakeLinks(const PageOrder& order, Geometry* geometry) {
 
 PageVoxels VoxelsInPageOrder(const PageField& page, const Geometry& geometry) {
   PageOrder order =
-      OrderOf(geometry, SectionBytes(page, geometry.cells.on() ? "tree" : "mask", kMaxPlaces));
+      OrderOfMask(SectionBytes(page, "mask", kMaxPlaces), geometry.frame.resolution);
   std::vector<int64_t> voxel = VoxelsOf(geometry, order);
   return {std::move(voxel), std::move(order.earlier)};
 }
@@ -190,16 +166,13 @@ PageVoxels VoxelsInPageOrder(const PageField& page, const Geometry& geometry) {
 PageField EncodeVoxels(const RadianceField& field, double step) {
   const Geometry& geometry = *field.geometry;
   const GridFrame& frame = geometry.frame;
-  const bool on_cells = geometry.cells.on();
   PageField page;
-  const std::string places = on_cells ? TreeOfCells(geometry) : MaskOfGrid(geometry);
-  const PageOrder order = OrderOf(geometry, places);
+  const std::string places = MaskOfGrid(geometry);
+  const PageOrder order = OrderOfMask(places, frame.resolution);
   const std::vector<int64_t> voxel = VoxelsOf(geometry, order);
   std::vector<int16_t> density;
   const double unit = VoxelWidth(frame);
-  for (size_t i = 0; i < voxel.size(); ++i)
-    density.push_back(
-        DensityNumber(geometry.density[voxel[i]], unit * (1 << order.width_log2[i])));
+  for (const int64_t i : voxel) density.push_back(DensityNumber(geometry.density[i], unit));
   page.header = JsonValue::Object{
       {"format", kPageFormat},
       {"voxels", static_cast<int64_t>(voxel.size())},
@@ -207,12 +180,11 @@ PageField EncodeVoxels(const RadianceField& field, double step) {
        JsonValue::Array{frame.resolution.x, frame.resolution.y, frame.resolution.z}},
       {"center", ArrayOf(frame.center)},
       {"radius", ArrayOf(frame.radius)},
-      {"finest", on_cells ? JsonValue(geometry.cells.finest) : JsonValue()},
       {"basis", field.appearance.basis},
       {"background", ArrayOf(field.background)},
       {"near", double{field.near_clip}},
       {"step", double{field.step}}};
-  AddSection(on_cells ? "tree" : "mask", places, &page);
+  AddSection("mask", places, &page);
   AddSection("density", PackNumbers(density, 1, order.earlier), &page);
   EncodeVoxelColors({field.appearance.sh.data(), field.appearance.basis, voxel}, order.earlier,
                     step, &page);
@@ -226,33 +198,26 @@ RadianceField DecodeVoxels(const PageField& page) {
   GridFrame& frame = geometry->frame;
   const std::vector<double> resolution = NumbersAt(header, "resolution", 3);
   for (int a = 0; a < 3; ++a) {
-    if (!(resolution[a] >= 2 && resolution[a] <= kMaxLattice))
+    if (!(resolution[a] >= 2 && resolution[a] <= kMaxPageSide))
       throw InputError("the resolution is not valid", kWhere);
     frame.resolution[a] = static_cast<int>(resolution[a]);
   }
   ReadBox(header, &frame);
-  const bool on_cells = !header.At("finest").IsNull();
-  const std::string places = SectionBytes(page, on_cells ? "tree" : "mask", kMaxPlaces);
-  const int finest =
-      on_cells ? static_cast<int>(std::clamp<int64_t>(header.At("finest").AsInt(), -1, 99)) : 0;
-  const PageOrder order = on_cells ? OrderOfTree(places, frame.resolution, finest)
-                                   : OrderOfMask(places, frame.resolution);
+  const PageOrder order = OrderOfMask(SectionBytes(page, "mask", kMaxPlaces), frame.resolution);
   if (order.place.empty()) throw InputError("there are no voxels", kWhere);
   RadianceField field;
   field.appearance.basis = BasisOf(header);
   const int channels = field.appearance.stride();
   const std::vector<int16_t> density =
       UnpackNumbers(SectionBytes(page, "density", 2 * order.place.size()), 1, order.earlier);
-  on_cells ? MakeCells(order, finest, geometry.get()) : MakeLinks(order, geometry.get());
+  MakeLinks(order, geometry.get());
   const double unit = VoxelWidth(frame);
   const auto n = static_cast<int64_t>(order.place.size());
   geometry->density.Resize(n);
   field.appearance.sh.Resize(n * channels);
   const std::vector<int64_t> voxel = VoxelsOf(*geometry, order);
-  for (size_t i = 0; i < voxel.size(); ++i) {
-    geometry->density[voxel[i]] =
-        AsHalf(DensityOfNumber(density[i], unit * (1 << order.width_log2[i])), unit);
-  }
+  for (size_t i = 0; i < voxel.size(); ++i)
+    geometry->density[voxel[i]] = AsHalf(DensityOfNumber(density[i], unit), unit);
   DecodeVoxelColors(page, field.appearance.basis, voxel, order.earlier, &field.appearance.sh);
   DecodeSpheres(page, geometry.get(), &field.appearance.sphere_color);
   field.background = Vec3At(header, "background");

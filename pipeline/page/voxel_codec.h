@@ -1,6 +1,6 @@
 // Packs the voxels of a page's field.
 //
-// Sections: "tree" or "mask" (page_order.h); "density" (see EQ(page-density)); "color" (see
+// Sections: "mask" (page_order.h); "density" (see EQ(page-density)); "color" (see
 // EQ(page-color-code)); and of background spheres "sphere_mask" (a bit for each texel of the
 // map, [2R, R], the lowest bit first), "sphere_density" and "sphere_color" of texels [columns,
 // layers]. Numbers are packed as EQ(page-prediction) says.

@@ -16,8 +16,6 @@ namespace {
 namespace po = boost::program_options;
 using Words = std::vector<std::string>;
 
-constexpr const char* kAuto = "auto";
-
 // The text behind the one of `beginnings` that it has, see OptionInfo::runs; nothing without.
 std::optional<std::string> Behind(const std::string& text, const char* beginnings) {
   std::optional<std::string> found;
@@ -140,10 +138,6 @@ void OptionSet::Assign(const Entry& entry, const std::string& text, const std::s
           *target = values;
         } else if constexpr (std::is_same_v<T, std::vector<std::string>>) {
           target->push_back(text);
-        } else if constexpr (std::is_same_v<T, std::optional<float>>) {
-          *target = text == kAuto
-                        ? std::nullopt
-                        : std::optional(ParseNumber<float>(text, info, where, "auto or "));
         } else {
           *target = ParseNumber<T>(text, info, where);
         }
@@ -202,8 +196,6 @@ JsonValue OptionSet::ValueOf(const Entry& entry) {
           return array;
         } else if constexpr (std::is_same_v<T, float>) {
           return ShortestDouble(*target);
-        } else if constexpr (std::is_same_v<T, std::optional<float>>) {
-          return target->has_value() ? JsonValue(ShortestDouble(**target)) : JsonValue(kAuto);
         } else {
           return *target;
         }

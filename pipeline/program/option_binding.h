@@ -68,9 +68,8 @@ class OptionSet {
   int count() const;  // of flags
 
  private:
-  using Target =
-      std::variant<bool*, int*, int64_t*, uint64_t*, float*, std::optional<float>*, double*,
-                   std::string*, std::vector<int>*, std::vector<std::string>*>;
+  using Target = std::variant<bool*, int*, int64_t*, uint64_t*, float*, double*, std::string*,
+                              std::vector<int>*, std::vector<std::string>*>;
   struct Entry {
     std::string heading, name;
     Target target;

@@ -31,13 +31,12 @@ std::string BoundsText(const OptionInfo& info);
 
 // The whole text must be one finite number within the bounds. Throws as RefuseValue.
 template <typename T>
-T ParseNumber(const std::string& text, const OptionInfo& info, const std::string& where,
-              const std::string& or_else = "") {
+T ParseNumber(const std::string& text, const OptionInfo& info, const std::string& where) {
   T value{};
   const char* end = text.data() + text.size();
   const auto result = std::from_chars(text.data(), end, value);
   const std::string allowed =
-      or_else + BoundsText(info) + (std::is_integral_v<T> ? ", a whole number" : "");
+      BoundsText(info) + (std::is_integral_v<T> ? ", a whole number" : "");
   if (result.ec != std::errc() || result.ptr != end || text.empty())
     RefuseValue(where, text, allowed);
   if constexpr (std::is_floating_point_v<T>)

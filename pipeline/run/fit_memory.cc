@@ -55,8 +55,8 @@ StagePlan PlanFitAt(const FitPlace& place, const FitOptions& options) {
 }
 
 FitOptions AdaptedTo(const FitOptions& options, const FitPlace& place) {
-  return AdaptOptions(options, {place.device_coordinates, place.backend == Backend::kCuda,
-                                place.pixels, place.box.background.has_value()});
+  return AdaptOptions(options,
+                      {.on_card = place.backend == Backend::kCuda, .pixels = place.pixels});
 }
 
 PlannedFit FitWithinMemory(FitOptions options, const FitPlace& place) {
@@ -64,10 +64,8 @@ PlannedFit FitWithinMemory(FitOptions options, const FitPlace& place) {
   PlannedFit fit{std::move(options), {}, ""};
   const int finest = Finest(fit.options);
   if (MayLower(place) && LowerToMemory(plan_of, LimitOf(place), &fit.options))
-    fit.notice = (fit.options.adaptive() ? Format("the field has at most %.1f million cells",
-                                                  double{fit.options.max_cells})
-                                         : Concat("the finest grid has ", Finest(fit.options),
-                                                  " voxels a side instead of ", finest)) +
+    fit.notice = Concat("the finest grid has ", Finest(fit.options),
+                        " voxels a side instead of ", finest) +
                  ToFitInto(place);
   fit.plan = plan_of(fit.options);
   CheckFitsMemory(fit.plan, LimitOf(place), MemoryOf(place));

@@ -18,7 +18,6 @@ struct FitPlace {
   int64_t pixels = 0;  // of the photos that are fitted, at working size
   int64_t photos = 0;  // that are fitted
   SceneBox box = {};
-  bool device_coordinates = false;
   double max_memory_gb = 0;   // of 10^9 bytes; 0: what is free
   bool reproducible = false;  // free memory must not change the fit
 };

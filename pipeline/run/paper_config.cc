@@ -11,8 +11,6 @@ namespace {
 // What the configurations have in common.
 void UseCommon(RunSettings* settings) {
   FitOptions& fit = settings->fit;
-  fit.MakeUniform();
-  fit.fewer_stages = false;
   fit.rays_per_step = 5000;
   fit.patch = 1;
   fit.sh_degree = 2;
@@ -179,11 +177,7 @@ PaperChoice ChoosePaperConfig(const std::string& asked, const PaperTraits& trait
   return {"custom", "the photos are opaque, and the cameras look in several directions"};
 }
 
-void CheckPaper(const std::string& preset, const std::string& config,
-                const std::string& field) {
-  if (preset == "paper" && field != "uniform")
-    throw UsageError("the paper's field has voxels of one width", "--fit-field " + field,
-                     "leave it out, or use another --preset");
+void CheckPaper(const std::string& preset, const std::string& config) {
   if (preset != "paper" && config != "auto")
     throw UsageError("is a choice within --preset paper", "--paper-config",
                      "add --preset paper, or leave it out");

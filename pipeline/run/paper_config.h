@@ -34,9 +34,8 @@ struct PaperChoice {
 // without transparent photos and for llff without a forward-facing capture.
 PaperChoice ChoosePaperConfig(const std::string& asked, const PaperTraits& traits);
 
-// Throws Error(kUsage) for a field of several levels with --preset paper, and for a
-// configuration without it.
-void CheckPaper(const std::string& preset, const std::string& config, const std::string& field);
+// Throws Error(kUsage) for a configuration without --preset paper.
+void CheckPaper(const std::string& preset, const std::string& config);
 
 // Sets the options, bound after --preset paper, to the choice. An option stays where a flag set
 // it, or where its value is not the base's: it was asked for.

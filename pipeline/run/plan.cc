@@ -21,26 +21,9 @@ constexpr double kWeightBytes = 4;       // of a voxel, in each thread
 // Rates are for two threads.
 double SecondsWith(double seconds, int threads) { return seconds * 2 / std::max(threads, 1); }
 
-constexpr double kCellBytes = 45, kStatisticBytes = 24;
-constexpr int kStatisticThreads = 4;
-
-// Cells of an adaptive field at a stage's end, and voxels of a uniform one.
-struct StageSize {
-  double cells = 0, voxels = 0, vertices_of_grid = 0;
-};
-StageSize SizeOf(const FitOptions& options, const SceneBox& box, size_t stage) {
+double VerticesOf(const FitOptions& options, const SceneBox& box, size_t stage) {
   const Vec3i n = GridOfStage(options, box, stage);
-  const double all = static_cast<double>(n.x) * n.y * n.z;
-  if (!options.adaptive()) {
-    const double stored = all * (stage == 0 ? 1 : kStoredFraction);
-    const double most = double{options.max_voxels} * 1e6;
-    return {0, most > 0 ? std::min(stored, most) : stored, all};
-  }
-  const double longest = options.resolutions[stage];
-  const double cells = stage == 0 ? all
-                                  : std::min({all, kCellsOfSquare * longest * longest,
-                                              double{options.max_cells} * 1e6});
-  return {cells, cells * kVerticesOfCell, 0};
+  return static_cast<double>(n.x) * n.y * n.z;
 }
 
 std::string MemoryText(double bytes) {
@@ -54,19 +37,24 @@ int64_t ExpectedPixels(int64_t photos, int photo_size, int holdout) {
   return (photos - held_out) * photo_size * photo_size * 3 / 4;
 }
 
+double PlannedVoxels(const FitOptions& options, const SceneBox& box, size_t stage) {
+  const double stored = VerticesOf(options, box, stage) * (stage == 0 ? 1 : kStoredFraction);
+  const double most = double{options.max_voxels} * 1e6;
+  return most > 0 ? std::min(stored, most) : stored;
+}
+
 StagePlan PlanFit(const FitOptions& options, int64_t photo_pixels, const SceneBox& box,
                   int threads) {
   const double record = 4.0 * RecordLanes(BasisOfDegree(options.sh_degree));
   const int arenas = options.shards > 0 ? options.shards : std::max(threads, 1);
   double field = 0, seconds = 0;
   for (size_t s = 0; s < options.resolutions.size(); ++s) {
-    const auto [cells, voxels, vertices] = SizeOf(options, box, s);
+    const double voxels = PlannedVoxels(options, box, s),
+                 vertices = VerticesOf(options, box, s);
     const double gradients = record + kIndexBytes + arenas * kIndexBytes;
-    const double pruning = record + (cells > 0 ? 0 : threads * kWeightBytes);
-    field = std::max(
-        field,
-        voxels * (2 * record + kIndexBytes + gradients + pruning) + vertices * 2 * kGridBytes +
-            cells * (2 * kCellBytes + std::min(threads, kStatisticThreads) * kStatisticBytes));
+    const double pruning = record + threads * kWeightBytes;
+    field = std::max(field, voxels * (2 * record + kIndexBytes + gradients + pruning) +
+                                vertices * 2 * kGridBytes);
     const double rays = static_cast<double>(options.steps[s]) * options.rays_per_step;
     seconds += rays / kRaysPerSecond * options.resolutions[s] / kRateResolution;
   }
@@ -85,30 +73,17 @@ StagePlan PlanFitOnDevice(const FitOptions& options, int64_t photo_pixels,
                           const SceneBox& box) {
   constexpr double kSampleStore = 1 << 30, kVertexBytes = 4 + 4 + 1 + 1, kSamplesPerRay = 40,
                    kExactSumsSlower = 2;
-  // Of an adaptive field's vertex its density, that one's rate and its key, and where it comes
-  // from; of a cell while vertices are numbered itself, and its corners in two orders with what
-  // their sort needs.
-  constexpr double kCellVertexBytes = 4 + 4 + 8, kSourceBytes = 8,
-                   kSortedCellBytes = 13 + 8 * (2 * 12 + 12);
   const double record = 4.0 * RecordLanes(BasisOfDegree(options.sh_degree));
   double peak = 0, coarser = 0, seconds = 0;
   for (size_t s = 0; s < options.resolutions.size(); ++s) {
-    const auto [cells, voxels, vertices] = SizeOf(options, box, s);
+    const double voxels = PlannedVoxels(options, box, s),
+                 vertices = VerticesOf(options, box, s);
     // Values, gradients, moments; exact sums are twice as wide.
-    const double wide = (options.exact_sums ? 4 : 3) * record;
-    if (cells > 0) {
-      const double beside = voxels * kCellVertexBytes + cells * kCellBytes;
-      const double field = voxels * wide + beside;
-      peak = std::max({peak, field + kSampleStore + cells * kStatisticBytes,
-                       field + coarser + voxels * kSourceBytes,
-                       coarser + cells * kSortedCellBytes});
-      coarser = voxels * record + beside;  // first its moments, then its values
-    } else {
-      const double field = voxels * (wide + kIndexBytes) + vertices * kVertexBytes;
-      // No samples are stored during resampling, which needs marks and ranks of vertices.
-      peak = std::max(peak, field + coarser + kSampleStore);
-      coarser = field + 4 * voxels;  // with weights, which decide what is kept
-    }
+    const double field = voxels * ((options.exact_sums ? 4 : 3) * record + kIndexBytes) +
+                         vertices * kVertexBytes;
+    // No samples are stored during resampling, which needs marks and ranks of vertices.
+    peak = std::max(peak, field + coarser + kSampleStore);
+    coarser = field + 4 * voxels;  // with weights, which decide what is kept
     seconds += static_cast<double>(options.steps[s]) * options.rays_per_step * kSamplesPerRay /
                kDeviceSamplesPerSecond;
   }
@@ -209,15 +184,6 @@ bool LowerToMemory(const std::function<StagePlan(const FitOptions&)>& plan_of, u
                    FitOptions* options) {
   bool lowered = false;
   while (limit > 0 && plan_of(*options).memory > limit) {
-    if (options->adaptive()) {
-      if (options->max_cells <= kLeastCells) break;
-      const double square = static_cast<double>(options->resolutions.back()) *
-                            options->resolutions.back() * kCellsOfSquare * 1e-6;
-      options->max_cells = static_cast<float>(
-          std::max(double{kLeastCells}, 0.9 * std::min<double>(options->max_cells, square)));
-      lowered = true;
-      continue;
-    }
     auto& sides = options->resolutions;
     const int finest = *std::ranges::max_element(sides);
     if (finest <= kLeastResolution) break;

@@ -8,12 +8,9 @@
 // once. Less is needed to write a checkpoint or a field (nothing per voxel), to continue from a
 // checkpoint (its file besides values and moments), and to read a field: 4 + 12 basis B per
 // voxel that it keeps, and 58 of the file's arrays.
-//
-// An adaptive field has vertices in the place of voxels, and 45 B a cell: key, level, corners
-// and its part of the tree. While cells change, the old and the new ones are there, and three
-// statistics of 8 B a cell in each of up to four threads.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <functional>
 #include <string>
@@ -26,9 +23,6 @@ namespace regrade {
 
 // 1.4 M of 3.4 M vertices, of a box fitted to its scene, at 192 voxels on the longest side.
 inline constexpr double kStoredFraction = 0.4;
-// An adaptive field's cells lie at surfaces: 16 to 25 times the square of the finest stage's
-// resolution on five captures. It has 1.2 vertices a cell.
-inline constexpr double kCellsOfSquare = 25, kVerticesOfCell = 1.2;
 inline constexpr double kProgramBytes = 150e6;
 // With two threads, at a grid of kRateResolution a side; a ray's cost grows with the
 // resolution.
@@ -49,14 +43,15 @@ struct StagePlan {
 // `holdout`-th is kept out, as in HeldOutViews, and all are taken for 4:3 and no smaller.
 int64_t ExpectedPixels(int64_t photos, int photo_size, int holdout);
 
+// Voxels that a stage stores: a part of its grid's vertices, at most max_voxels.
+double PlannedVoxels(const FitOptions& options, const SceneBox& box, size_t stage);
 // `photo_pixels`: of all fitted photos, at working size. A cube, the upper bound, for a `box`
 // that is not known yet.
 StagePlan PlanFit(const FitOptions& options, int64_t photo_pixels, const SceneBox& box,
                   int threads);
-// On a GPU: values, gradients and moments per voxel; links, densities and distances per vertex
-// of a uniform grid, and the coarser one beside the finer one during resampling; the cells of
-// an adaptive field, and values or moments of the field before beside a new one; 6 B per pixel;
-// and the buffer of samples in flight.
+// On a GPU: values, gradients and moments per voxel; links, densities and distances per vertex;
+// the coarser grid beside the finer one during resampling; 6 B per pixel; and the buffer of
+// samples in flight.
 StagePlan PlanFitOnDevice(const FitOptions& options, int64_t photo_pixels, const SceneBox& box);
 // Of splats. On a CPU a splat is taken to have 6 entries, on a card 11; a step's time grows
 // with the photo's pixels and, half of the most on average, with the splats.
@@ -82,11 +77,10 @@ uint64_t PlannedMemory(double max_memory_gb, uint64_t available);
 // `limit` bytes of `memory` ("memory", "GPU memory"). A limit of 0 is unknown and not checked.
 void CheckFitsMemory(const StagePlan& plan, uint64_t limit, const char* memory = "memory");
 
-// Lowers the resolutions of the finest stages, to no less than kLeastResolution, or the cells
-// of an adaptive field, to no less than kLeastCells millions, until the plan takes at most
-// `limit` bytes. Returns false if nothing was lowered. Half the voxels cost about 1 dB.
+// Lowers the resolutions of the finest stages, to no less than kLeastResolution, until the plan
+// takes at most `limit` bytes. Returns false if nothing was lowered. Half the voxels cost about
+// 1 dB.
 inline constexpr int kLeastResolution = 64;
-inline constexpr float kLeastCells = 0.25f;
 bool LowerToMemory(const std::function<StagePlan(const FitOptions&)>& plan_of, uint64_t limit,
                    FitOptions* options);
 

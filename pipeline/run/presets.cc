@@ -11,24 +11,24 @@
 namespace regrade {
 namespace {
 
-// The fit takes about 1, 5 and 20 minutes on two cores, at most 10, 40 and 120 s on a card of
-// the class of an H200; that of smoke a few seconds, and no film of it is worth a look.
+// Of voxels, planned (plan.h): about 1, 4 and 8 minutes on two cores, and at most half a minute
+// on a card of the class of an H200; smoke takes a few seconds, and no film of it is worth a
+// look.
 struct FitEffort {
   const char* preset;
   bool on_card;
   std::vector<int> resolutions, steps;
-  float max_cells;  // millions
 };
 
 const FitEffort kFitEfforts[] = {
-    {"smoke", false, {24, 48, 96}, {100, 100, 100}, 0.2f},
-    {"draft", false, {48, 96, 192, 384}, {350, 350, 400, 450}, 2},
-    {"standard", false, {48, 96, 192, 384, 768}, {600, 700, 900, 1200, 1400}, 5},
-    {"best", false, {48, 96, 192, 384, 768}, {1500, 1500, 2000, 3000, 4500}, 16},
-    {"smoke", true, {24, 48, 96}, {100, 100, 100}, 0.2f},
-    {"draft", true, {48, 96, 192, 384}, {600, 600, 700, 1100}, 6},
-    {"standard", true, {48, 96, 192, 384, 768}, {800, 800, 1000, 1200, 2400}, 12},
-    {"best", true, {48, 96, 192, 384, 768, 1536}, {2000, 2000, 2400, 2400, 3600, 6000}, 20},
+    {"smoke", false, {24, 48, 96}, {100, 100, 100}},
+    {"draft", false, {64, 128, 192}, {400, 1000, 600}},
+    {"standard", false, {64, 128, 256}, {800, 2000, 3000}},
+    {"best", false, {96, 192, 320}, {2000, 3000, 4000}},
+    {"smoke", true, {24, 48, 96}, {100, 100, 100}},
+    {"draft", true, {64, 128, 256}, {800, 2000, 3000}},
+    {"standard", true, {96, 192, 384}, {2000, 3000, 4000}},
+    {"best", true, {128, 256, 512}, {3000, 5000, 8000}},
 };
 
 struct SplatEffort {
@@ -57,7 +57,6 @@ void UseFitEffort(const std::string& preset, bool on_card, FitOptions* fit) {
   if (found == std::end(kFitEfforts)) return;
   fit->resolutions = found->resolutions;
   fit->steps = found->steps;
-  fit->max_cells = found->max_cells;
 }
 
 }  // namespace
@@ -75,8 +74,6 @@ void ApplyPreset(const std::string& preset, bool on_card, RunSettings* settings)
   ApplyStyleRecipe(preset == "paper" ? "paper" : "standard", &settings->network);
   UseFitEffort(preset, on_card, &settings->fit);
   UseSplatEffort(preset, on_card, &settings->splats);
-  // Views between the photos see cells of little weight in all of them (COSTS.md).
-  settings->fit.prune_last = preset != "best";
   if (preset == "smoke") {
     settings->scene.photo_size = 160;
     settings->network.steps = 60;

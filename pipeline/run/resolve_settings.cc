@@ -49,20 +49,6 @@ JsonValue RecipeValues(const std::string& recipe) {
   return OptionValues(network);
 }
 
-// The rates and regularisers that suit a field of another kind than the settings' so far.
-JsonValue FieldValues(const std::string& field) {
-  FitOptions other;
-  if (field == "uniform") other.MakeUniform();
-  const JsonValue values = OptionValues(other);
-  FitOptions uniform;
-  uniform.MakeUniform();
-  const JsonValue plain = OptionValues(FitOptions()), changed = OptionValues(uniform);
-  JsonValue set = JsonValue::Object();
-  for (const auto& [name, value] : values.AsObject())
-    if (!(plain.At(name) == changed.At(name))) set[name] = value;
-  return set;
-}
-
 // Writes those of the values that the set has.
 void ApplyKnown(const JsonValue& values, const std::string& where, OptionSet* options) {
   const JsonValue known = options->Values();
@@ -70,13 +56,6 @@ void ApplyKnown(const JsonValue& values, const std::string& where, OptionSet* op
   for (const auto& [name, value] : values.AsObject())
     if (known.Find(name) != nullptr) kept[name] = value;
   options->ApplyConfig(kept, where);
-}
-
-void ApplyField(const std::string& field, OptionSet* options) {
-  const JsonValue values = options->Values();
-  const JsonValue* now = values.Find("fit-field");
-  if (now != nullptr && now->AsString() != field)
-    ApplyKnown(FieldValues(field), "--fit-field", options);
 }
 
 // Refuses flags and constants of a kind of field that the run does not fit. Without photos,
@@ -188,9 +167,6 @@ std::vector<std::string> ResolveSettings(const SettingsSources& sources, OptionS
   }
   if (const auto recipe = options->Given("recipe"))
     ApplyKnown(RecipeValues(*recipe), "--recipe", options);
-  if (const auto field = options->Given("fit-field")) ApplyField(*field, options);
-  if (options->Given("fit-resolutions"))
-    ApplyKnown(JsonValue::Object{{"fit-fewer-stages", false}}, "--fit-resolutions", options);
   if (config && !given.is_run) options->ApplyConfig(given.run.options, given.name);
   options->ApplyFlags();
   RefuseFlagsOfOtherField(*options, given);

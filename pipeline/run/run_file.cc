@@ -1,5 +1,7 @@
 #include "pipeline/run/run_file.h"
 
+#include <algorithm>
+#include <array>
 #include <filesystem>
 
 #include "kernels/base/error.h"
@@ -22,12 +24,43 @@ void CheckSchema(const JsonValue& run) {
       "", "run again with another --out, or delete the output folder");
 }
 
+// Options of the fits of earlier versions, which every run.json of theirs names; and what a
+// rate or weight of theirs could be instead of a number.
+constexpr std::array kEarlierOptions = {
+    "fit-field",     "fit-fewer-stages",      "fit-cell-pixels",
+    "fit-max-cells", "fit-max-forward-cells", "fit-outward",
+    "fit-free-space"};
+constexpr std::array kEarlierAuto = {"fit-rate-density", "fit-rate-density-end", "tv-density",
+                                     "tv-sh"};
+
+// What stages, rates and weights begin with: those of an octree are not a grid's.
+constexpr std::array kOfTheFit = {"fit-", "tv-", "prune-", "background-"};
+
+// Without those of earlier versions.
+JsonValue OptionsOf(const JsonValue& options) {
+  if (!options.IsObject()) return options;  // refused where it is used
+  const JsonValue* const field = options.Find("fit-field");
+  const bool octree = field != nullptr && field->IsString() && field->AsString() != "uniform";
+  JsonValue kept = JsonValue::Object();
+  for (const auto& [name, value] : options.AsObject()) {
+    if (octree && std::ranges::any_of(kOfTheFit, [&name](const char* first) {
+          return name.starts_with(first);
+        }))
+      continue;
+    const bool is_auto = value.IsString() && value.AsString() == "auto" &&
+                         std::ranges::find(kEarlierAuto, name) != kEarlierAuto.end();
+    if (!is_auto && std::ranges::find(kEarlierOptions, name) == kEarlierOptions.end())
+      kept[name] = value;
+  }
+  return kept;
+}
+
 RunFile RunFileOf(const JsonValue& value) {
   CheckSchema(value);
   RunFile file;
   for (const JsonValue& word : value.At("arguments").AsArray())
     file.words.push_back(word.AsString());
-  file.options = value.At("options");
+  file.options = OptionsOf(value.At("options"));
   return file;
 }
 

@@ -10,7 +10,7 @@ namespace regrade {
 
 struct RunFile {
   std::vector<std::string> words;  // arguments that are not options, paths absolute
-  JsonValue options;               // object
+  JsonValue options;               // object, without options that earlier versions had
 };
 
 // Throws Error(kUsage) with line and column for what is not such a file, or of another schema.

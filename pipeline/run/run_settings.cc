@@ -117,11 +117,10 @@ void CheckTogether(const RunSettings& settings) {
   for (const auto& [sides, flag] :
        {std::pair{&settings.fit.resolutions_y, "fit-resolutions-y"},
         std::pair{&settings.fit.resolutions_z, "fit-resolutions-z"}})
-    if (!sides->empty() && (settings.fit.adaptive() || sides->size() != grids))
-      throw UsageError(
-          Concat("belongs to a uniform field, with a side for each of ", grids, " stages"),
-          flag, "leave it out, or give --fit-field uniform and the sides");
-  CheckPaper(settings.run.preset, settings.run.paper_config, settings.fit.field);
+    if (!sides->empty() && sides->size() != grids)
+      throw UsageError(Concat("has ", sides->size(), " sides for ", grids, " stages"), flag,
+                       "leave it out, or give a side for each stage");
+  CheckPaper(settings.run.preset, settings.run.paper_config);
   FitKindOf(settings).check(settings);
   const StyleMethod method = ParseStyleMethod(settings.style_2d);
   CheckResidual(settings, method.kind);

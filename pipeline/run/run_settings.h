@@ -135,7 +135,7 @@ struct RenderOptions {
                   "balance of their photos, where these were undone"});
     bind("exact", exact,
          {.help = "renders the film's frames as exactly as the views; by default their smooth "
-                  "parts are interpolated, and a GPU renders uniform fields in half precision, "
+                  "parts are interpolated, and a GPU renders voxels in half precision, "
                   "with one colour for each 1/128 of opacity"});
     bind("vignette", vignette,
          {.help =

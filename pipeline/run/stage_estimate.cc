@@ -14,7 +14,7 @@ namespace {
 // photos that the 2D method styles, of exact frames with both fields and the 2D method, of the
 // film's, and of compared pairs; and of a report with its page.
 constexpr double kDecode = 0.03, kStyle2d = 0.17, kExactFrame = 2.3, kFilmFrame = 0.75,
-                 kPair = 0.55, kReport = 3, kPageOfMillionCells = 4.5;
+                 kPair = 0.55, kReport = 3, kPageOfMillionVoxels = 3.75;
 constexpr double kAroundFit = 1.16;        // the trial of degrees, pruning and measuring
 constexpr double kOfResidual = 1.5;        // of exact frames at the photos' places
 constexpr double kFasterOnCard = 1.0 / 8;  // training and frames, roughly
@@ -63,6 +63,13 @@ double EvaluateSeconds(const RunSettings& settings, const CaptureSize& size) {
   return kPair * pairs * Megapixels(size, settings.scene.photo_size);
 }
 
+// Beyond a report's: a page of splats takes no longer.
+double PageSeconds(const RunSettings& settings) {
+  const FitOptions& fit = settings.fit;
+  if (settings.page.page == "off" || settings.scene.field != "voxels") return 0;
+  return kPageOfMillionVoxels * 1e-6 * PlannedVoxels(fit, {}, fit.resolutions.size() - 1);
+}
+
 }  // namespace
 
 CaptureSize SizeOfCapture(const Capture& capture) {
@@ -99,10 +106,6 @@ std::vector<StageEstimate> EstimateStages(const RunSettings& settings, const Cap
   double stylize = PlanStyle(settings.network.steps, threads).seconds;
   if (settings.residual.On())
     stylize += Scaled(kOfResidual * kExactFrame * photos * photo, threads);
-  const double finest = *std::ranges::max_element(settings.fit.resolutions),
-               cells = std::min(double{settings.fit.max_cells},
-                                1e-6 * kCellsOfSquare * finest * finest);
-  const double page = settings.page.page == "off" ? 0 : kPageOfMillionCells * cells;
   return {
       {"pose", PoseSeconds(size, threads)},
       {"reconstruct", kAroundFit * fit.seconds, fit.memory},
@@ -111,7 +114,7 @@ std::vector<StageEstimate> EstimateStages(const RunSettings& settings, const Cap
       {"stylize", on_card * stylize},
       {"render", on_card * Scaled(RenderSeconds(settings, size), threads)},
       {"evaluate", Scaled(EvaluateSeconds(settings, size), threads)},
-      {"report", Scaled(kReport + page, threads)},
+      {"report", Scaled(kReport + PageSeconds(settings), threads)},
   };
 }
 

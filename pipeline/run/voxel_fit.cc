@@ -22,11 +22,10 @@ class VoxelFit : public FieldFit {
   }
 
   std::vector<std::string> FitIntoMemory() override {
-    std::vector<std::string> sentences = {NoteOfAdapting(settings_.fit, options_)};
     PlannedFit fit = FitWithinMemory(options_, place_);
     options_ = std::move(fit.options);
-    sentences.push_back(fit.notice);
-    sentences.push_back("the fit will take " + PlanText(fit.plan));
+    std::vector<std::string> sentences = {fit.notice,
+                                          "the fit will take " + PlanText(fit.plan)};
     std::erase(sentences, "");
     return sentences;
   }

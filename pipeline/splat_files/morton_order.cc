@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <utility>
 
-#include "kernels/field/cell_lattice.h"
+#include "kernels/base/morton.h"
 
 namespace regrade {
 
@@ -14,7 +14,7 @@ std::vector<int64_t> MortonOrder(const SplatsView<float>& splats) {
       low[a] = std::min(low[a], splats.mean[3 * i + a]);
       high[a] = std::max(high[a], splats.mean[3 * i + a]);
     }
-  std::vector<std::pair<CellKey, int64_t>> keys;
+  std::vector<std::pair<uint64_t, int64_t>> keys;
   keys.reserve(static_cast<size_t>(splats.count));
   for (int64_t i = 0; i < splats.count; ++i) {
     Vec3i place;
@@ -22,7 +22,7 @@ std::vector<int64_t> MortonOrder(const SplatsView<float>& splats) {
       const double width = double{high[a]} - double{low[a]};
       if (width > 0)
         place[a] = static_cast<int>((double{splats.mean[3 * i + a]} - double{low[a]}) / width *
-                                    (kMaxLattice - 1));
+                                    kMostPlace);
     }
     keys.emplace_back(KeyOf(place), i);
   }

@@ -51,12 +51,9 @@ FittedPictures FitPictures(const WorkingViews& views, const StoredField& scene,
   if (training_views.empty())
     throw InputError("the 2D method has a picture of none of the photos", "views_2d");
   const SceneBox box = BoxOf(views.capture(), settings, background);
-  const std::unique_ptr<FieldFit> fit =
-      FitKindOf(settings).make(settings, {.backend = backend,
-                                          .pixels = pixels,
-                                          .photos = std::ssize(training_views),
-                                          .box = box,
-                                          .device_coordinates = scene.ndc.on()});
+  const std::unique_ptr<FieldFit> fit = FitKindOf(settings).make(
+      settings,
+      {.backend = backend, .pixels = pixels, .photos = std::ssize(training_views), .box = box});
   fit->LimitDegree(DegreeOfField(scene.field));
   FittedField field =
       fit->Run(training_views, {.progress = progress, .checkpoint = {}, .note = ""});

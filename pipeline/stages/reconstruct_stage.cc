@@ -45,7 +45,6 @@ FitPlace PlaceOf(const RunSettings& settings, const WorkingViews& views,
           .pixels = PixelsToFit(views),
           .photos = std::ssize(views.Training()),
           .box = scene.box,
-          .device_coordinates = scene.ndc.on(),
           .max_memory_gb = settings.run.max_memory_gb,
           .reproducible = settings.run.reproducible};
 }

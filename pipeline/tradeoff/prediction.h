@@ -30,9 +30,8 @@ FitPlace ExpectedPlace(const RunSettings& settings, int64_t photos);
 
 // The amount of `unit` in a run with these settings:
 //   trials: of view dependence, 1 or 0, the same work for every capture |
-//   photo megapixels: at matching size | ray voxels: rays times the grid's side, over the
-//   stages that the fit of these photos has (see AdaptOptions) |
-//   planned seconds: of a fit of splats |
+//   photo megapixels: at matching size | ray voxels: rays times the grid's side, over all
+//   stages of the fit | planned seconds: of a fit of splats |
 //   photo pixels: at working size | staged pixels: at the original size | style rays |
 //   frame pixels | pair pixels
 double AmountOf(const std::string& unit, const RunSettings& settings, const Capture& capture);

@@ -189,7 +189,6 @@ const VariantRunner::Photos& VariantRunner::PhotosAt(int size) {
   }
   p.place.photos = std::ssize(p.views);
   p.place.box = p.scene.box;
-  p.place.device_coordinates = p.scene.ndc.on();
   return p;
 }
 

@@ -23,7 +23,7 @@ TrainingView Smaller(const TrainingView& view, double scale, std::vector<Image>*
   const int width = std::max(1, static_cast<int>(std::lround(view.camera.width * factor)));
   const int height = std::max(1, static_cast<int>(std::lround(view.camera.height * factor)));
   photos->push_back(Resize(*view.photo, width, height));
-  return {view.camera.Resized(width, height), &photos->back(), view.points};
+  return {view.camera.Resized(width, height), &photos->back()};
 }
 
 // Over all pixels of all views that have a colour; masked ones are NaN.
@@ -50,8 +50,7 @@ DegreeTrial TryDegrees(const std::vector<TrainingView>& views, const SceneBox& b
                        const FitOptions& options, const ProgressFunction& progress,
                        Backend backend) {
   if (views.size() < kLeastTrialViews) return {std::numeric_limits<double>::infinity()};
-  FitOptions small = options;
-  small.MakeUniform();  // one of few voxels is made sooner
+  FitOptions small = options;  // with the rates of the fit
   const int resolution = std::min(kResolution, options.resolutions.back());
   small.resolutions = {std::max(8, resolution / 2), resolution};
   small.steps = {kSteps[0], kSteps[1]};

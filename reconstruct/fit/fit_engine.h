@@ -4,15 +4,12 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
-#include <vector>
 
 #include "kernels/device/backend.h"
 #include "kernels/field/density_losses.h"
-#include "kernels/field/free_space.h"
 #include "kernels/field/render.h"
 #include "kernels/optimize/rmsprop.h"
 #include "reconstruct/fit/fit_field.h"
-#include "reconstruct/fit/measure_cells.h"
 
 namespace regrade {
 
@@ -25,9 +22,6 @@ struct FitStep {
   RmspropOptions optimizer;
   // The lambdas of density_losses.h, before the division by the rays.
   DensityLosses losses;
-  // See EQ(free-space), of an adaptive field: rays drawn, and the weight of their mean opacity.
-  int free_rays = 0;
-  float free_space = 0;
   // Total variation, with weights of its mean over all voxels. Each step regularises one
   // contiguous sampling run from a random start: tv_fraction of all grid vertices on the CPU,
   // tv_fraction of the stored voxels on the GPU; the expected gradient is the same.
@@ -46,7 +40,7 @@ struct FitSums {
   int64_t rejected_voxels = 0;
 };
 
-// Which voxels of a uniform field stay.
+// Which voxels stay.
 struct PruneLimits {
   bool by_density = false;  // or else by the largest rendering weight in any view
   float least = 0;
@@ -57,7 +51,6 @@ class FitEngine {
  public:
   virtual ~FitEngine() = default;
 
-  virtual void SetFreeRays(std::vector<FreeRay> rays) = 0;  // none unless this is called
   virtual void SetState(FitState state) = 0;
   // Calls `read` with the grid and the moments, without a copy where they are in host memory.
   // `read` may set stage, step and tally, and nothing else.
@@ -72,10 +65,6 @@ class FitEngine {
   virtual FitSums TakeSums() = 0;  // since the last call; may wait for queued steps
   // Renders the current field, colours clipped. Copies only the image to the host.
   virtual RenderedView Render(const Camera& camera, const MarchOptions& march) = 0;
-  // Of an adaptive field: removes and splits cells, as ApplyChanges does. Background spheres,
-  // if any, get maps of `sphere_resolution`; their moments become 0 where that is another one.
-  virtual void RefineCells(const MarchOptions& march, const CellLimits& limits,
-                           int sphere_resolution) = 0;
   // Prunes voxels and resamples; resets the optimizer's state, as in svox2. Background spheres,
   // if any, get maps of `sphere_resolution` and are not pruned.
   virtual void Refine(const MarchOptions& march, const PruneLimits& limits,

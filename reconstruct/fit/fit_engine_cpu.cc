@@ -25,7 +25,6 @@ class CpuFitEngine : public FitEngine {
   CpuFitEngine(const TrainingRays* rays, uint64_t seed, int shards)
       : rays_(rays), seed_(seed), arenas_(static_cast<size_t>(shards)) {}
 
-  void SetFreeRays(std::vector<FreeRay> rays) override { free_rays_ = std::move(rays); }
   void SetState(FitState state) override {
     state_ = std::move(state);
     if (state_.second_moment.size() != state_.grid.records.size())
@@ -47,7 +46,6 @@ class CpuFitEngine : public FitEngine {
   void Step(const FitStep& step) override {
     const int patches = std::max(1, step.rays / (step.patch * step.patch));
     rays_->Draw(seed_, step.number, patches, step.patch, &batch_rays_, &batch_targets_);
-    DrawFreeRays(step);
     Accumulate(step);
     StepVoxels(step.optimizer);
     if (state_.grid.spheres.on()) StepLayers(step.optimizer);
@@ -77,19 +75,6 @@ class CpuFitEngine : public FitEngine {
     ResetArenas();
   }
 
-  void RefineCells(const MarchOptions& march, const CellLimits& limits,
-                   int sphere_resolution) override {
-    const CellStatistics statistics = MeasureCells(state_.grid, *rays_, march, kPruningStride);
-    ApplyChanges(ChooseChanges(state_.grid.cells().level, statistics, limits), &state_.grid,
-                 &state_.second_moment);
-    FastSpheres& spheres = state_.grid.spheres;
-    if (spheres.on() && sphere_resolution != spheres.resolution) {
-      spheres = ResampleSpheres(spheres, sphere_resolution);
-      state_.sphere_moment = Buffer<float>(spheres.texels.size());
-    }
-    ResetArenas();
-  }
-
  private:
   Buffer<float> Densities() const {
     Buffer<float> densities(state_.grid.num_voxels());
@@ -106,24 +91,14 @@ class CpuFitEngine : public FitEngine {
     }
   }
 
-  void DrawFreeRays(const FitStep& step) {
-    free_batch_.clear();
-    if (free_rays_.empty()) return;
-    for (int i = 0; i < step.free_rays; ++i)
-      free_batch_.push_back(free_rays_[RandomIndex(
-          seed_ ^ kRandomFreeSpace, step.number, static_cast<uint64_t>(i), free_rays_.size())]);
-  }
-
   void Accumulate(const FitStep& step) {
     const int64_t n = static_cast<int64_t>(batch_rays_.size());
     const float scale = 1.0f / (3.0f * static_cast<float>(n));
     const int shards = static_cast<int>(arenas_.size());
     std::vector<FitStepResult> results(arenas_.size());
-    // The sampling run of total variation (see FitStep): contiguous vertices, or cells, from a
-    // random start, wrapping around, scaled so that the expectation is lambda times the mean
-    // over all.
-    const int64_t vertices = state_.grid.cells().on() ? state_.grid.cells().num_cells()
-                                                      : state_.grid.frame.NumVertices();
+    // The sampling run of total variation (see FitStep): contiguous vertices from a random
+    // start, wrapping around, scaled so that the expectation is lambda times the mean over all.
+    const int64_t vertices = state_.grid.frame.NumVertices();
     const int64_t run = static_cast<int64_t>(step.tv_fraction * static_cast<float>(vertices));
     const int64_t run_begin = static_cast<int64_t>(RandomIndex(
         seed_ ^ kRandomTotalVariation, step.number, 0, static_cast<uint64_t>(vertices)));
@@ -145,12 +120,6 @@ class CpuFitEngine : public FitEngine {
         FastRays().total_variation(state_.grid, from, from + count, step.tv_density * tv_scale,
                                    step.tv_sh * tv_scale, arena);
         v += count;
-      }
-      if (step.free_space > 0 && !free_batch_.empty()) {
-        const int64_t free = std::ssize(free_batch_);
-        const int64_t from = free * s / shards, to = free * (s + 1) / shards;
-        FastRays().free_space(state_.grid, free_batch_.data() + from, to - from,
-                              step.free_space / static_cast<float>(free), arena);
       }
       if (state_.grid.spheres.on()) RegularizeLayers(step, s, shards, &arena->spheres);
     }
@@ -222,7 +191,6 @@ class CpuFitEngine : public FitEngine {
   FitState state_;
   FitSums sums_;
   std::vector<GradientArena> arenas_;
-  std::vector<FreeRay> free_rays_, free_batch_;
   std::vector<Ray> batch_rays_;
   std::vector<Vec3f> batch_targets_;
 };

@@ -8,8 +8,6 @@
 #include "kernels/base/error.h"
 #include "kernels/base/random.h"
 #include "kernels/base/random_streams.h"
-#include "kernels/field/cuda/device_cell_statistics.h"
-#include "kernels/field/cuda/device_free_space.h"
 #include "kernels/field/cuda/device_rays.h"
 #include "kernels/field/cuda/device_sphere_rays.h"
 #include "kernels/field/cuda/device_views.h"
@@ -27,7 +25,6 @@ class CudaFitEngine : public FitEngine {
   CudaFitEngine(const TrainingRays* rays, uint64_t seed, bool exact_sums)
       : seed_(seed), exact_sums_(exact_sums), views_(rays->ToDevice()) {}
 
-  void SetFreeRays(std::vector<FreeRay> rays) override { free_space_.emplace(rays); }
   void SetState(FitState state) override {
     grid_ = UploadGrid(state.grid, true, state.second_moment, exact_sums_, state.sphere_moment);
     Renew();
@@ -57,28 +54,22 @@ class CudaFitEngine : public FitEngine {
     }
     Reserve(step.rays);
     views_.Draw(seed_, step.number, step.rays, rays_.data(), targets_.data());
-    if (free_space_)
-      free_space_->Accumulate(grid_, seed_ ^ kRandomFreeSpace, step.number, step.free_rays,
-                              step.free_space, &touched_);
     fitter_->Accumulate(
         grid_, rays_.data(), targets_.data(), step.rays,
         1.0f / (3.0f * static_cast<float>(step.rays)), &touched_,
         {step.losses.beta / static_cast<float>(step.rays), step.losses.sparsity});
     // The sampling run of total variation is over stored voxels (see FitStep): each is chosen
     // with probability tv_fraction, so the expectation equals the CPU's.
-    const bool adaptive = grid_.cells.on();
-    const int64_t voxels = adaptive ? grid_.cells.num_cells() : grid_.num_voxels();
+    const int64_t voxels = grid_.num_voxels();
     const int64_t run = static_cast<int64_t>(step.tv_fraction * static_cast<float>(voxels));
     if (run > 0) {
       const int64_t begin = static_cast<int64_t>(RandomIndex(
           seed_ ^ kRandomTotalVariation, step.number, 0, static_cast<uint64_t>(voxels)));
       const float scale =
-          1.0f / (adaptive ? static_cast<float>(run)
-                           : step.tv_fraction * static_cast<float>(grid_.frame.NumVertices()));
+          1.0f / (step.tv_fraction * static_cast<float>(grid_.frame.NumVertices()));
       AddTotalVariation(grid_, begin, run, step.tv_density * scale, step.tv_sh * scale,
                         &touched_);
     }
-    if (free_space_) free_space_->Join();
     StepOnDevice(&grid_, &touched_, step.optimizer, fitter_->sums());
     if (grid_.spheres.on()) StepLayers(step);
   }
@@ -90,19 +81,6 @@ class CudaFitEngine : public FitEngine {
 
   RenderedView Render(const Camera& camera, const MarchOptions& march) override {
     return RenderViewOnDevice(grid_, camera, march);
-  }
-
-  void RefineCells(const MarchOptions& march, const CellLimits& limits,
-                   int sphere_resolution) override {
-    const DeviceRange range("changing cells");
-    constexpr int kStride = 2;  // every other row and column of a view
-    DropFitter();
-    const CellStatistics statistics = MeasureCellsOnDevice(grid_, views_, march, kStride);
-    const auto change = ChooseChanges(grid_.cells.level.ToHost(), statistics, limits);
-    grid_ = ChangeCellsOnDevice(std::move(grid_), change);
-    if (grid_.spheres.on() && sphere_resolution != grid_.spheres.resolution)
-      grid_.spheres = Resampled(std::move(grid_.spheres), sphere_resolution);
-    if (grid_.num_voxels() > 0) Renew();
   }
 
   void Refine(const MarchOptions& march, const PruneLimits& limits, const Vec3i& resolution,
@@ -213,7 +191,6 @@ class CudaFitEngine : public FitEngine {
   DeviceTouched touched_;
   MarchOptions march_;
   std::optional<DeviceRayFitter> fitter_;
-  std::optional<DeviceFreeSpace> free_space_;
   FitSums sums_;  // of previous fitters
   DeviceBuffer<Ray> rays_;
   DeviceBuffer<Vec3f> targets_;

@@ -7,14 +7,12 @@
 #include <cmath>
 #include <cstdio>
 #include <memory>
-#include <optional>
 #include <utility>
 
 #include "kernels/base/error.h"
+#include "kernels/field/spherical_harmonics.h"
 #include "reconstruct/fit/adapt_options.h"
 #include "reconstruct/fit/fit_engine.h"
-#include "reconstruct/fit/free_rays.h"
-#include "reconstruct/fit/initial_cells.h"
 #include "reconstruct/fit/resample_grid.h"
 #include "reconstruct/fit/sphere_grid.h"
 
@@ -32,15 +30,11 @@ double PsnrOf(double squared_error, int64_t rays) {
          std::log10(squared_error / (3.0 * static_cast<double>(std::max<int64_t>(rays, 1))));
 }
 
-FitConditions ConditionsOf(const std::vector<TrainingView>& views, const SceneBox& box,
-                           Backend backend) {
+FitConditions ConditionsOf(const std::vector<TrainingView>& views, Backend backend) {
   FitConditions conditions;
-  conditions.known_background = box.background.has_value();
   conditions.on_card = backend == Backend::kCuda;
-  for (const TrainingView& view : views) {
-    conditions.device_coordinates = conditions.device_coordinates || view.camera.ndc.on();
+  for (const TrainingView& view : views)
     conditions.pixels += int64_t{view.camera.width} * view.camera.height;
-  }
   return conditions;
 }
 
@@ -48,10 +42,9 @@ class Fitter {
  public:
   Fitter(const std::vector<TrainingView>& views, const SceneBox& box, const FitOptions& options,
          const FitHooks& hooks, Backend backend)
-      : rays_(views, options.adaptive() ? box.background : std::nullopt),
-        views_(views),
+      : rays_(views),
         box_(box),
-        options_(AdaptOptions(options, ConditionsOf(views, box, backend))),
+        options_(AdaptOptions(options, ConditionsOf(views, backend))),
         hooks_(hooks),
         sums_each_step_(backend == Backend::kCpu) {
     REGRADE_CHECK_EQ(options_.resolutions.size(), options_.steps.size());
@@ -67,11 +60,6 @@ class Fitter {
   }
 
   FitResult Run() {
-    if (options_.adaptive() && *options_.free_space > 0) {
-      const float cell = 2 * std::max({box_.radius.x, box_.radius.y, box_.radius.z}) /
-                         static_cast<float>(options_.resolutions[0]);
-      engine_->SetFreeRays(FreeRays(views_, kFreeMargin * cell, options_.seed));
-    }
     FitState state;
     if (hooks_.resume != nullptr) {
       state = std::move(*hooks_.resume);
@@ -79,12 +67,12 @@ class Fitter {
       state.grid = InitialGrid();
       if (box_.background) state.grid.background = *box_.background;
       if (state.grid.num_voxels() == 0 ||
-          (options_.initial_views < 2 && views_.size() > 1 &&
+          (options_.initial_views < 2 && rays_.num_views() > 1 &&
            !TwoViewsShareAPlace(rays_, state.grid.frame, box_.near_clip)))
         throw SceneError(
             Concat("no place is seen by ",
                    options_.initial_views <= 2 ? "two" : std::to_string(options_.initial_views),
-                   " of the ", views_.size(),
+                   " of the ", rays_.num_views(),
                    " photos that are fitted: wrong poses, or too few"),
             "reconstruct",
             "check the poses against the photos, or give more photos that "
@@ -138,26 +126,11 @@ class Fitter {
   }
 
   FastGrid InitialGrid() const {
-    const int basis = BasisOf(options_.sh_degree), coarsest = options_.resolutions[0];
-    if (options_.adaptive()) {
-      const CellLevels levels = Levels();
-      return MakeInitialCells(rays_, CellFrame(box_, coarsest, levels), levels, basis,
-                              options_.initial_density, box_.near_clip, options_.initial_views,
-                              box_.far_surroundings);
-    }
     const GridFrame frame{GridOfStage(options_, box_, 0), box_.center, box_.radius};
-    return MakeInitialGrid(rays_, frame, basis, options_.initial_density, box_.near_clip,
-                           options_.initial_views, box_.far_surroundings);
+    return MakeInitialGrid(rays_, frame, BasisOfDegree(options_.sh_degree),
+                           options_.initial_density, box_.near_clip, options_.initial_views,
+                           box_.far_surroundings);
   }
-
-  // Spheres and device coordinates reach to infinity, and nothing is behind a transparent
-  // photo.
-  CellLevels Levels() const {
-    const bool bounded = !box_.far_surroundings && box_.layers == 0 && !box_.background;
-    return {static_cast<int>(options_.resolutions.size()) - 1, bounded ? options_.outward : 0};
-  }
-
-  static int BasisOf(int degree) { return (degree + 1) * (degree + 1); }
 
   int StepsBefore() const {
     int steps = step_;
@@ -210,18 +183,14 @@ class Fitter {
     step.march = {options_.step, options_.stop_transmittance};
     step.optimizer.rate_sh = ExponentialRate(options_.rate_sh, options_.rate_sh_end, p);
     step.optimizer.rate_density =
-        ExponentialRate(*options_.rate_density, *options_.rate_density_end, p) *
+        ExponentialRate(options_.rate_density, options_.rate_density_end, p) *
         DelayFactor(number, options_.density_delay * static_cast<float>(total_steps_));
     step.optimizer.view_bound = options_.view_bound;
     if (!options_.bound_mean) step.optimizer.mean_bound = kUnbounded;
     step.losses = {options_.beta_loss, options_.sparsity_loss};
-    if (options_.adaptive()) {
-      step.free_rays = std::max(1, options_.rays_per_step / kRaysPerFreeRay);
-      step.free_space = *options_.free_space;
-    }
     step.tv_fraction = options_.tv_fraction;
-    step.tv_density = decay * *options_.tv_density;
-    step.tv_sh = decay * *options_.tv_sh;
+    step.tv_density = decay * options_.tv_density;
+    step.tv_sh = decay * options_.tv_sh;
     if (!box_.far_surroundings) return step;
     step.optimizer.rate_sphere_density = ExponentialRate(
         options_.rate_background_density, options_.rate_background_density_end, p);
@@ -232,12 +201,6 @@ class Fitter {
     step.tv_sphere_density = sphere_decay * options_.tv_background_density;
     step.tv_sphere_color = sphere_decay * options_.tv_background_color;
     return step;
-  }
-
-  [[noreturn]] void ThrowEmpty() const {
-    throw Error(ExitCode::kScene,
-                "no cell of the scene is left: none has enough weight in any view",
-                "reconstruct", "check the poses, or lower prune-weight by --config");
   }
 
   int LeadSteps() const {
@@ -255,16 +218,6 @@ class Fitter {
   void Refine(bool last) {
     const int last_stage = static_cast<int>(options_.resolutions.size()) - 1;
     const int sphere_resolution = SphereResolution(std::min(stage_, last_stage));
-    if (options_.adaptive()) {
-      const float width = static_cast<float>(options_.resolutions[0]);
-      engine_->RefineCells({options_.step, options_.stop_transmittance},
-                           {options_.prune_weight / width, Levels().outward,
-                            options_.cell_pixels, last ? 0 : Levels().outward + stage_,
-                            static_cast<int64_t>(double{options_.max_cells} * 1e6)},
-                           sphere_resolution);
-      if (engine_->num_voxels() == 0) ThrowEmpty();
-      return;
-    }
     const Vec3i now = engine_->resolution();
     const Vec3i next = last ? now : GridOfStage(options_, box_, static_cast<size_t>(stage_));
     const bool by_density = options_.prune_by == "density";
@@ -341,12 +294,9 @@ class Fitter {
     idle_seconds_ += SecondsSince(begin);
   }
 
-  static constexpr int kWindow = 20;          // steps
-  static constexpr float kFreeMargin = 0.4f;  // cells of the first stage
-  static constexpr int kRaysPerFreeRay = 4;
+  static constexpr int kWindow = 20;  // steps
 
   TrainingRays rays_;
-  const std::vector<TrainingView>& views_;
   SceneBox box_;
   FitOptions options_;
   FitHooks hooks_;

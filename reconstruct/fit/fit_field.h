@@ -1,10 +1,8 @@
 // Fits a radiance field to posed photos, coarse to fine: RMSProp on touched voxels, total
-// variation and pruning by rendering weight as Plenoxels (Fridovich-Keil et al., CVPR 2022), on
-// cells of many sizes or on voxels of one width.
+// variation and pruning by rendering weight as Plenoxels (Fridovich-Keil et al., CVPR 2022).
 #pragma once
 
 #include <functional>
-#include <optional>
 #include <string>
 #include <vector>
 

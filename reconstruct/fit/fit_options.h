@@ -2,7 +2,6 @@
 #pragma once
 
 #include <cstdint>
-#include <optional>
 #include <string>
 #include <vector>
 
@@ -11,31 +10,31 @@
 namespace regrade {
 
 struct FitOptions {
-  std::string field = "adaptive";
-  std::vector<int> resolutions = {48, 96, 192, 384, 768};
+  std::vector<int> resolutions = {64, 128, 256};
   std::vector<int> resolutions_y, resolutions_z;
-  bool fewer_stages = true;
-  std::vector<int> steps = {600, 700, 900, 1200, 1400};
+  std::vector<int> steps = {800, 2000, 3000};
   int rays_per_step = 0;  // 0: see AdaptOptions
   int patch = 1;
   int sh_degree = 2;
   float view_bound = 0.2f;
   float step = 1.0f;
   float stop_transmittance = 1e-3f;
-  // Without a value: see AdaptOptions.
-  std::optional<float> rate_density, rate_density_end, tv_density, tv_sh, free_space;
+  float rate_density = 8.0f;
+  float rate_density_end = 1.0f;
   int rate_steps = 0;
   float density_delay = 0;
-  float rate_sh = 5e-2f;
-  float rate_sh_end = 2e-3f;
-  float tv_decay = 0.7f;
-  float tv_fraction = 0.02f;
+  float rate_sh = 6e-2f;
+  float rate_sh_end = 5e-3f;
+  float tv_density = 1e-2f;
+  float tv_sh = 1e-2f;
+  float tv_decay = 0.5f;
+  float tv_fraction = 0.03f;
   float beta_loss = 0;
   float sparsity_loss = 0;
   bool bound_mean = true;
   std::string prune_by = "weight";
-  float prune_weight = 0.4f;
-  bool prune_last = false;
+  float prune_weight = 0.5f;
+  bool prune_last = true;
   float max_voxels = 0;
   int initial_views = 2;
   float initial_density = 0.5f;
@@ -51,47 +50,24 @@ struct FitOptions {
   float tv_background_fraction = 0.01f;
   bool tv_background_decays = true;
   float initial_background_density = 0.1f;
-  float background_lead = 0.25f;
-  float cell_pixels = 1.0f;
-  float max_cells = 5.0f, max_forward_cells = 12.0f;
-  int outward = 2;
+  float background_lead = 0.9f;
   int shards = 0;
   bool exact_sums = false;
   uint64_t seed = 0;
 
-  bool adaptive() const { return field != "uniform"; }
-  // Makes the field uniform, with the rates and regularisers that suit it: the defaults above
-  // are an adaptive field's.
-  void MakeUniform() {
-    field = "uniform";
-    rate_density = 8;
-    rate_density_end = 1;
-    rate_sh = 6e-2f;
-    rate_sh_end = 5e-3f;
-    tv_density = tv_sh = 1e-2f;
-    tv_decay = 0.5f;
-    tv_fraction = 0.03f;
-    prune_weight = 0.5f;
-    prune_last = true;
-    background_lead = 0.9f;
-  }
   template <typename Bind>
   void Describe(Bind& bind) {
-    bind("fit-field", field,
-         {.help = "uniform: voxels of one width; adaptive: cells that are halved where two "
-                  "photos see them wider than a pixel",
-          .choices = "adaptive|uniform"});
     bind("fit-resolutions", resolutions,
          {.unit = "voxels",
-          .help = "longest side of the grid in each stage, coarse to fine; an adaptive field "
-                  "doubles it in each stage, and its memory grows with fit-max-cells",
+          .help = "longest side of the grid in each stage, coarse to fine; memory grows with "
+                  "its cube",
           .min = 8,
           .max = 2048});
     bind(
         "fit-resolutions-y", resolutions_y,
         {.unit = "voxels",
-         .help = "uniform field: --fit-resolutions are of the box's x axis, and these of its y "
-                 "axis; none: as the box's sides",
+         .help = "--fit-resolutions are of the box's x axis, and these of its y axis; none: as "
+                 "the box's sides",
          .min = 2,
          .max = 2048,
          .may_be_empty = true,
@@ -102,10 +78,6 @@ struct FitOptions {
           .min = 2,
           .max = 2048,
           .may_be_empty = true,
-          .constant = true});
-    bind("fit-fewer-stages", fewer_stages,
-         {.help = "leaves out last stages that are finer than the photos can determine; giving "
-                  "--fit-resolutions switches it off",
           .constant = true});
     bind("fit-steps", steps,
          {.unit = "steps",
@@ -153,18 +125,15 @@ struct FitOptions {
           .max = 0.1,
           .constant = true});
     bind("fit-rate-density", rate_density,
-         {.help = "RMSProp learning rate of densities at the start; auto: 58, of photos that "
-                  "face one way 12",
+         {.help = "RMSProp learning rate of densities at the start",
           .min = 0,
           .max = 1e4,
           .constant = true});
-    bind(
-        "fit-rate-density-end", rate_density_end,
-        {.help = "learning rate of densities at the end (exponential in between); auto: 24, of "
-                 "photos that face one way 2",
-         .min = 0,
-         .max = 1e4,
-         .constant = true});
+    bind("fit-rate-density-end", rate_density_end,
+         {.help = "learning rate of densities at the end (exponential in between)",
+          .min = 0,
+          .max = 1e4,
+          .constant = true});
     bind("fit-rate-steps", rate_steps,
          {.unit = "steps",
           .help = "learning rates reach their ends after so many steps, even if the fit ends "
@@ -189,18 +158,15 @@ struct FitOptions {
         {.help = "learning rate of colours at the end", .min = 0, .max = 10, .constant = true});
     bind("tv-density", tv_density,
          {.help =
-              "weight of the total variation of densities: smoother surfaces, fewer floaters; "
-              "auto: 0.05, of transparent photos 0.002",
+              "weight of the total variation of densities: smoother surfaces, fewer floaters",
           .min = 0,
           .max = 10,
           .constant = true});
-    bind(
-        "tv-sh", tv_sh,
-        {.help = "weight of the total variation of colours; auto: 0.004, of transparent photos "
-                 "0.00016",
-         .min = 0,
-         .max = 10,
-         .constant = true});
+    bind("tv-sh", tv_sh,
+         {.help = "weight of the total variation of colours",
+          .min = 0,
+          .max = 10,
+          .constant = true});
     bind("tv-decay", tv_decay,
          {.help = "factor on the weights of total variation at each finer stage",
           .min = 0,
@@ -223,17 +189,14 @@ struct FitOptions {
           .max = 10,
           .constant = true});
     bind("prune-by", prune_by,
-         {.help = "removes voxels of a uniform field between stages whose rendering weight is "
-                  "below prune-weight / resolution in every view (weight), / the next stage's "
+         {.help = "removes voxels between stages whose rendering weight is below "
+                  "prune-weight / resolution in every view (weight), / the next stage's "
                   "resolution along z (weight-of-next), or whose density is below "
                   "prune-weight (density)",
           .choices = "weight|weight-of-next|density",
           .constant = true});
     bind("prune-weight", prune_weight,
-         {.help = "the limit of prune-by; an adaptive field has weights",
-          .min = 0,
-          .max = 100,
-          .constant = true});
+         {.help = "the limit of prune-by", .min = 0, .max = 100, .constant = true});
     bind("prune-last", prune_last,
          {.help =
               "prunes after the last stage, too: smaller files, and less fog in local edits; "
@@ -241,7 +204,7 @@ struct FitOptions {
           .constant = true});
     bind("fit-max-voxels", max_voxels,
          {.unit = "millions of voxels",
-          .help = "uniform field: pruning raises its limit where more would be kept; 0: never",
+          .help = "pruning raises its limit where more would be kept; 0: never",
           .min = 0,
           .max = 2000,
           .constant = true});
@@ -321,41 +284,6 @@ struct FitOptions {
           .help = "time in which only the background is fitted",
           .min = 0,
           .max = 0.9,
-          .constant = true});
-    bind("fit-cell-pixels", cell_pixels,
-         {.unit = "pixels",
-          .help =
-              "adaptive field: cells that only one photo sees wider than this are not halved",
-          .min = 0.1,
-          .max = 100,
-          .constant = true});
-    bind("fit-max-cells", max_cells,
-         {.unit = "millions of cells",
-          .help = "adaptive field: where more would be halved, those that explain the largest "
-                  "errors are; see fit-max-forward-cells",
-          .min = 0.001,
-          .max = 200,
-          .constant = true});
-    bind("fit-max-forward-cells", max_forward_cells,
-         {.unit = "millions of cells",
-          .help = "adaptive field: a forward-facing capture has at most this many cells",
-          .min = 0.001,
-          .max = 200,
-          .constant = true});
-    bind(
-        "fit-outward", outward,
-        {.unit = "doublings",
-         .help = "adaptive field: the region around the scene's box is 2^N times as wide, with "
-                 "cells as much wider, for what photos show behind the scene",
-         .min = 0,
-         .max = 5,
-         .constant = true});
-    bind("fit-free-space", free_space,
-         {.help = "adaptive field: keeps the space clear between cameras and the points they "
-                  "saw; less fog where few photos look; auto: 0.02, of photos that face one "
-                  "way 0",
-          .min = 0,
-          .max = 10,
           .constant = true});
     bind("fit-shards", shards,
          {.help = "gradient arenas; 0: one per thread, or 4 with --reproducible",

@@ -46,6 +46,31 @@ bool InsideBall(const GridFrame& frame, const Vec3f& p) {
   return Norm(q) <= 1 + std::sqrt(3.0f) / static_cast<float>(least);
 }
 
+// Number of cameras that see a point beyond near_clip, up to `enough`. A vertex may project
+// just outside of a photo and still be a corner of a visible cell.
+int ViewsThatSee(const TrainingRays& rays, const Vec3d& p, float near_clip, int enough) {
+  constexpr double kMargin = 0.02;  // of the photo's side
+  int views = 0;
+  for (int v = 0; v < rays.num_views() && views < enough; ++v) {
+    const Camera& camera = rays.camera(v);
+    const Vec3d point = camera.ndc.on() ? WorldFromNdc(camera.ndc, p) : p;
+    double x, y;
+    if (Norm(point - camera.Center()) < near_clip || !camera.Project(point, &x, &y)) continue;
+    const double mx = kMargin * camera.width, my = kMargin * camera.height;
+    views += x >= -mx && x <= camera.width + mx && y >= -my && y <= camera.height + my;
+  }
+  return views;
+}
+
+// `at` counts voxels from the box's corner.
+Vec3d WorldOfLattice(const GridFrame& frame, const Vec3d& at) {
+  Vec3d world;
+  for (int a = 0; a < 3; ++a)
+    world[a] = double{frame.center[a]} +
+               (2 * at[a] / frame.resolution[a] - 1) * double{frame.radius[a]};
+  return world;
+}
+
 }  // namespace
 
 FastGrid MakeInitialGrid(const TrainingRays& rays, const GridFrame& frame, int basis,
@@ -65,20 +90,8 @@ FastGrid MakeInitialGrid(const TrainingRays& rays, const GridFrame& frame, int b
             frame.WorldOf({static_cast<float>(x), static_cast<float>(y), static_cast<float>(z)})
                 .Cast<double>();
         if (ball && !InsideBall(frame, p.Cast<float>())) continue;
-        int views = 0;
-        for (int v = 0; v < rays.num_views() && views < min_views; ++v) {
-          const Camera& camera = rays.camera(v);
-          double u, w;
-          const Vec3d point = camera.ndc.on() ? WorldFromNdc(camera.ndc, p) : p;
-          if (Norm(point - camera.Center()) < near_clip || !camera.Project(point, &u, &w))
-            continue;
-          // A vertex may project just outside the image and still be a corner of a visible
-          // cell.
-          const double margin_x = 0.02 * camera.width, margin_y = 0.02 * camera.height;
-          views += u >= -margin_x && u <= camera.width + margin_x && w >= -margin_y &&
-                   w <= camera.height + margin_y;
-        }
-        seen[static_cast<size_t>(frame.Vertex(x, y, z))] = views >= min_views;
+        seen[static_cast<size_t>(frame.Vertex(x, y, z))] =
+            ViewsThatSee(rays, p, near_clip, min_views) >= min_views;
       }
   grid.links.Resize(frame.NumVertices());
   int32_t count = 0;
@@ -89,6 +102,21 @@ FastGrid MakeInitialGrid(const TrainingRays& rays, const GridFrame& frame, int b
   for (int64_t v = 0; v < count; ++v) grid.records[v * lanes + DensityLane(basis)] = density;
   RefreshDerived(&grid);
   return grid;
+}
+
+bool TwoViewsShareAPlace(const TrainingRays& rays, const GridFrame& frame, float near_clip) {
+  constexpr int kMostPlaces = 32;  // a side
+  Vec3i places;
+  for (int a = 0; a < 3; ++a) places[a] = std::clamp(frame.resolution[a], 1, kMostPlaces);
+  for (int x = 0; x <= places.x; ++x)
+    for (int y = 0; y <= places.y; ++y)
+      for (int z = 0; z <= places.z; ++z) {
+        const Vec3d at{double(x) * frame.resolution.x / places.x,
+                       double(y) * frame.resolution.y / places.y,
+                       double(z) * frame.resolution.z / places.z};
+        if (ViewsThatSee(rays, WorldOfLattice(frame, at), near_clip, 2) >= 2) return true;
+      }
+  return false;
 }
 
 Vec3i GridOfStage(const FitOptions& options, const SceneBox& box, size_t stage) {

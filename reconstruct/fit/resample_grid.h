@@ -18,6 +18,10 @@ namespace regrade {
 FastGrid MakeInitialGrid(const TrainingRays& rays, const GridFrame& frame, int basis,
                          float density, float near_clip, int min_views, bool ball = false);
 
+// Whether two cameras see one place of the frame, beyond near_clip: looks at as many places a
+// side as the frame has vertices, and at 32 of more.
+bool TwoViewsShareAPlace(const TrainingRays& rays, const GridFrame& frame, float near_clip);
+
 // Largest rendering weight of each voxel in any training view, from every `stride`-th row and
 // column.
 Buffer<float> MaxWeightsOverViews(const FastGrid& grid, const TrainingRays& rays,

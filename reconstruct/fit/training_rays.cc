@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 #include "kernels/base/error.h"
 #include "kernels/base/random.h"
@@ -35,8 +34,7 @@ uint64_t Morton(uint32_t x, uint32_t y) {
 
 }  // namespace
 
-TrainingRays::TrainingRays(const std::vector<TrainingView>& views,
-                           const std::optional<Vec3f>& background) {
+TrainingRays::TrainingRays(const std::vector<TrainingView>& views) {
   REGRADE_CHECK(!views.empty());
   std::vector<Camera> lenses;
   Vec3d sum{};
@@ -58,7 +56,7 @@ TrainingRays::TrainingRays(const std::vector<TrainingView>& views,
                       {}};
     stored.color.resize(photo.pixels.size());
     Vec3d view_sum{};
-    stored.drawn = DrawnPixels(photo, background);
+    stored.drawn = DrawnPixels(photo);
     for (const int32_t pixel : stored.drawn)
       for (int c = 0; c < 3; ++c) {
         const size_t at = 3 * static_cast<size_t>(pixel) + static_cast<size_t>(c);
@@ -91,17 +89,6 @@ Ray TrainingRays::RayOf(int view, int x, int y) const {
   Ray ray{v.origin, v.world_from_camera * d};
   if (v.camera.ndc.on()) NdcRay(v.camera.ndc, &ray.origin, &ray.direction);
   return ray;
-}
-
-Vec3f TrainingRays::ColorOf(int view, int x, int y) const {
-  const StoredView& v = views_[static_cast<size_t>(view)];
-  const int64_t pixel = static_cast<int64_t>(y) * v.camera.width + x;
-  constexpr float kNone = std::numeric_limits<float>::quiet_NaN();
-  if (v.IsMasked(pixel)) return {kNone, kNone, kNone};
-  const uint16_t* color = v.color.data() + 3 * pixel;
-  return Vec3f{static_cast<float>(color[0]), static_cast<float>(color[1]),
-               static_cast<float>(color[2])} /
-         65535.0f;
 }
 
 DeviceViews TrainingRays::ToDevice() const {

@@ -3,7 +3,6 @@
 #pragma once
 
 #include <cstdint>
-#include <optional>
 #include <vector>
 
 #include "kernels/field/cuda/device_views.h"
@@ -18,16 +17,14 @@ namespace regrade {
 struct TrainingView {
   Camera camera;
   const Image* photo = nullptr;
-  std::vector<SeenPoint> points = {};  // that the photo saw; used by adaptive fits
+  std::vector<SeenPoint> points = {};  // that the photo saw; used by fits of splats
 };
 
 class TrainingRays {
  public:
   // Copies the pixels (6 bytes each: unorm16, exact for 8-bit photos) and stores one direction
-  // map per lens. `background` is the colour of transparent parts, if photos have some; see
-  // DrawnPixels. Throws Error(kInput) for a view without an unmasked pixel.
-  explicit TrainingRays(const std::vector<TrainingView>& views,
-                        const std::optional<Vec3f>& background = {});
+  // map per lens. Throws Error(kInput) for a view without an unmasked pixel.
+  explicit TrainingRays(const std::vector<TrainingView>& views);
 
   int64_t num_rays() const { return total_; }
   int num_views() const { return static_cast<int>(views_.size()); }
@@ -40,7 +37,6 @@ class TrainingRays {
             std::vector<Vec3f>* targets) const;
 
   Ray RayOf(int view, int x, int y) const;
-  Vec3f ColorOf(int view, int x, int y) const;  // sRGB; NaN where masked
   // Copies all views to a CUDA device. Throws Error(kResources) if it does not fit, or without
   // CUDA.
   DeviceViews ToDevice() const;

@@ -19,8 +19,6 @@ namespace {
 __device__ int32_t CornerPoint(const StyleFieldView& grid, const DeviceWeightedSample& sample,
                                int k) {
   if (grid.mean != nullptr) return k == 0 ? sample.vertex : -1;
-  if (sample.vertex >= 0 && grid.cells.top != nullptr)
-    return grid.cells.corner[sample.vertex + k];
   if (sample.vertex >= 0)
     return grid.links[sample.vertex + GridSampler(grid).Steps(sample.vertex).To(k)];
   if (k & 1) return -1;

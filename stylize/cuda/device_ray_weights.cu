@@ -5,7 +5,6 @@
 #include "kernels/field/cuda/gradient_view.h"
 #include "kernels/field/cuda/launch.h"
 #include "kernels/field/cuda/warp_layers.h"
-#include "kernels/field/render_cells.h"
 #include "stylize/cuda/device_ray_weights.h"
 
 #if defined(__CUDACC__)
@@ -65,35 +64,6 @@ __global__ void MarchWeightsKernel(DeviceGridView grid, const Ray* rays, int64_t
     }
   }
   if (lane == 0) transmittance[r] = expf(-march.optical_depth());
-}
-
-// Of an adaptive field; a thread a ray, for the walk from cell to cell is sequential.
-__global__ void MarchCellWeightsKernel(DeviceGridView grid, const Ray* rays, int64_t n,
-                                       float stop, float min_weight, SampleList list,
-                                       float* transmittance, uint32_t* touched) {
-  const int64_t r = blockIdx.x * static_cast<int64_t>(blockDim.x) + threadIdx.x;
-  if (r >= n) return;
-  float depth = 0, before = 1;
-  WalkCells(grid.frame, grid.cells, rays[r], grid.near_clip, [&](const CellSample<float>& s) {
-    if (s.cell == kNoCell) return true;
-    float density;
-    InterpolateInCell(grid.cells, s, grid.dense_density, 1, 1, &density);
-    const float tau = OpticalDepth(density, s.delta);
-    if (!(tau > 0)) return true;
-    const float w = before * Opacity(tau);
-    if (w > min_weight) {
-      const int64_t at = atomicAdd(list.counter, 1);
-      if (at < list.capacity) {
-        list.samples[at] = {8 * s.cell, s.fraction, w, static_cast<int32_t>(r)};
-        for (int k = 0; k < 8 && touched != nullptr; ++k)
-          Touch(touched, grid.cells.corner[int64_t{8} * s.cell + k]);
-      }
-    }
-    depth += tau;
-    before = expf(-depth);
-    return !(before < stop);
-  });
-  transmittance[r] = before;
 }
 
 // Goes on behind the box.
@@ -188,13 +158,8 @@ void DeviceRayWeights::Launch(const DeviceGrid& grid, const Ray* rays, int64_t n
   counter.Zero();
   const SampleList list{samples.data(), samples.size(), counter.data()};
   uint32_t* const marks = touched != nullptr ? touched->bits.data() : nullptr;
-  if (grid.cells.on())
-    MarchCellWeightsKernel<<<BlocksFor(n), kThreads, 0, LaunchStream()>>>(
-        grid.view(), rays, n, options.stop_transmittance, min_weight, list,
-        transmittance.data(), marks);
-  else
-    MarchWeightsKernel<<<BlocksFor(32 * n), kThreads, 0, LaunchStream()>>>(
-        grid.view(), rays, n, options, min_weight, list, transmittance.data(), marks);
+  MarchWeightsKernel<<<BlocksFor(32 * n), kThreads, 0, LaunchStream()>>>(
+      grid.view(), rays, n, options, min_weight, list, transmittance.data(), marks);
   CheckLaunch("march_weights");
   if (!grid.spheres.on()) return;
   MarchSpheresKernel<<<BlocksFor(32 * n), kThreads, 0, LaunchStream()>>>(

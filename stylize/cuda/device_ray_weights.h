@@ -14,9 +14,7 @@ namespace regrade {
 
 // As WeightedSample.
 struct DeviceWeightedSample {
-  // Lowest corner of the cell; of an adaptive field, eight times the cell; negative on a
-  // background sphere. Or a splat.
-  int32_t vertex;
+  int32_t vertex;  // lowest corner of the cell; negative on a background sphere; or a splat
   Vec3f fraction;  // within the cell; of a splat, the direction from the camera to it
   float weight;
   int32_t ray;

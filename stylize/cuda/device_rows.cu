@@ -14,21 +14,17 @@ namespace regrade {
 
 namespace {
 
-// Of a voxel, or of an adaptive field's vertex: [-1, 1] across the box. Or of a splat.
+// Of a voxel, [-1, 1] across the box; or of a splat.
 __device__ Vec3f BoxPosition(const StyleFieldView& grid, int64_t voxel) {
   if (grid.mean != nullptr) {
     const float* const mean = grid.mean + 3 * voxel;
     return SplatPosition(grid.frame, {mean[0], mean[1], mean[2]});
   }
   const Vec3i size = grid.frame.resolution;
+  const int32_t vertex = grid.vertex_of_voxel[voxel];
   Vec3f place{0.5f, 0.5f, 0.5f};  // voxels from the box's corner
-  if (grid.vertex_key != nullptr) {
-    place = PlaceOf(grid.vertex_key[voxel]).Cast<float>();
-  } else {
-    const int32_t vertex = grid.vertex_of_voxel[voxel];
-    place += Vec3i{vertex / (size.y * size.z), vertex / size.z % size.y, vertex % size.z}
-                 .Cast<float>();
-  }
+  place += Vec3i{vertex / (size.y * size.z), vertex / size.z % size.y, vertex % size.z}
+               .Cast<float>();
   for (int a = 0; a < 3; ++a) place[a] = 2 * place[a] / static_cast<float>(size[a]) - 1;
   return place;
 }

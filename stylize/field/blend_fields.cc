@@ -60,9 +60,8 @@ bool SameGeometry(const Geometry& a, const Geometry& b) {
   return same_vector(a.frame.resolution, b.frame.resolution) &&
          same_vector(a.frame.center, b.frame.center) &&
          same_vector(a.frame.radius, b.frame.radius) && same(a.links, b.links) &&
-         a.cells.finest == b.cells.finest && same(a.cells.key, b.cells.key) &&
-         same(a.cells.level, b.cells.level) && same(a.density, b.density) &&
-         same(a.splats.mean, b.splats.mean) && same(a.splats.log_scale, b.splats.log_scale) &&
+         same(a.density, b.density) && same(a.splats.mean, b.splats.mean) &&
+         same(a.splats.log_scale, b.splats.log_scale) &&
          same(a.splats.quaternion, b.splats.quaternion) &&
          same(a.splats.opacity_logit, b.splats.opacity_logit) &&
          a.splats.fit_pixel == b.splats.fit_pixel && a.spheres.layers == b.spheres.layers &&

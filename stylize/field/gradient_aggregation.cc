@@ -225,8 +225,9 @@ AggregationResult GradientAggregation::Run(const LipschitzNetwork& network,
   if (gradient != nullptr) loss_sum += AddViewPenalty(network.data());
   ForgetTouched();
 
-  const double count = options_.divide_by_voxels ? SpatialCount(*field_.geometry)
-                                                 : 3.0 * static_cast<double>(result.rays);
+  const double count = options_.divide_by_voxels
+                           ? static_cast<double>(field_.geometry->num_voxels())
+                           : 3.0 * static_cast<double>(result.rays);
   if (result.rays == 0) return result;
   result.loss = loss_sum / count;
   if (gradient == nullptr) return result;

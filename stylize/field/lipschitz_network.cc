@@ -243,15 +243,6 @@ void FillFeatures(const RadianceField& field, float position_scale, int64_t voxe
   for (int a = 0; a < 3; ++a) row[shape.sh() + a] = position_scale * position[a];
 }
 
-double SpatialCount(const Geometry& geometry) {
-  const CellGrid& cells = geometry.cells;
-  if (!cells.on()) return static_cast<double>(geometry.num_voxels());
-  double count = 0;
-  for (int64_t c = 0; c < cells.num_cells(); ++c)
-    count += std::ldexp(1.0, 3 * (cells.finest - cells.level[c]));
-  return count;
-}
-
 void FillTexelFeatures(const RadianceField& field, float position_scale, int64_t texel,
                        int32_t at, float* row) {
   const int resolution = field.geometry->spheres.resolution;

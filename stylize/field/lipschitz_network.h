@@ -116,15 +116,12 @@ void AddBaseMap(const ColorMap& map, int basis, const T* sh, T* output) {
   for (int i = 0; i < 3 * basis; ++i) output[i] += mapped[i];
 }
 
-// The vertex of each voxel: the inverse of Geometry::links. Of an adaptive field, whose voxels
-// are vertices, and of splats, the voxel.
+// The vertex of each voxel: the inverse of Geometry::links. Of splats, the splat.
 std::vector<int32_t> VertexOfVoxel(const Geometry& geometry);
 
 // Feature row of a voxel, as RowOf(field.appearance.basis) says; `vertex` as VertexOfVoxel has
 // it. Coefficients of a smaller basis are padded with zeros, which leaves the bound as it is.
-// An adaptive field has one frame for the positions of all levels, see EQ(cell-lattice): where
-// two cells of different levels share a vertex, it is one record, restyled once. Of splats see
-// EQ(splat-position).
+// Positions of splats: EQ(splat-position).
 void FillFeatures(const RadianceField& field, float position_scale, int64_t voxel,
                   int32_t vertex, float* row);
 
@@ -132,10 +129,6 @@ void FillFeatures(const RadianceField& field, float position_scale, int64_t voxe
 // sphere as the position. `at`: its place in the map, x R + y.
 void FillTexelFeatures(const RadianceField& field, float position_scale, int64_t texel,
                        int32_t at, float* row);
-// How many records a field has where an average over the scene is meant: of a uniform grid the
-// voxels, of an adaptive field the volume of its cells in voxels of the finest level. A coarse
-// cell counts like the cells that it might be divided into.
-double SpatialCount(const Geometry& geometry);
 
 // The place in the map of each column: the inverse of SphereGeometry::links.
 std::vector<int32_t> PlaceOfColumn(const SphereGeometry& spheres);

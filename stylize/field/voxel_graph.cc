@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "kernels/field/cell_lattice.h"
 #include "kernels/field/field_kind.h"
 #include "kernels/field/spherical_harmonics.h"
 #include "stylize/field/lipschitz_network.h"
@@ -18,22 +17,6 @@ constexpr int kLevels = 6;
 constexpr int kNearest = 6;          // splats
 constexpr float kPlacesAcross = 64;  // of the box, for cubes of splats
 
-void KeepEachOnce(std::vector<std::array<int32_t, 2>>* edges) {
-  std::sort(edges->begin(), edges->end());
-  edges->erase(std::unique(edges->begin(), edges->end()), edges->end());
-}
-
-void AddCellEdges(const CellGrid& cells, std::vector<std::array<int32_t, 2>>* edges) {
-  for (int64_t c = 0; c < cells.num_cells(); ++c)
-    for (int k = 0; k < 8; ++k)
-      for (const int axis : {4, 2, 1}) {
-        if (k & axis) continue;
-        const int32_t a = cells.corner[8 * c + k], b = cells.corner[8 * c + (k | axis)];
-        edges->push_back({std::min(a, b), std::max(a, b)});
-      }
-  KeepEachOnce(edges);
-}
-
 void AddNearestEdges(const std::vector<Vec3f>& positions,
                      std::vector<std::array<int32_t, 2>>* edges) {
   const std::vector<int32_t> nearest = NearestPoints(positions, kNearest);
@@ -41,7 +24,8 @@ void AddNearestEdges(const std::vector<Vec3f>& positions,
     const int32_t a = static_cast<int32_t>(i / kNearest), b = nearest[i];
     if (b >= 0) edges->push_back({std::min(a, b), std::max(a, b)});
   }
-  KeepEachOnce(edges);
+  std::sort(edges->begin(), edges->end());
+  edges->erase(std::unique(edges->begin(), edges->end()), edges->end());
 }
 
 // In the box's proportions: within [-2, 2], see EQ(splat-position).
@@ -112,10 +96,6 @@ VoxelGraph GraphOf(const RadianceField& field) {
     for (size_t v = 0; v < places.size(); ++v)
       for (int a = 0; a < 3; ++a)
         places[v][a] = static_cast<int32_t>((positions[v][a] + 2) * (kPlacesAcross / 2));
-  } else if (geometry.cells.on()) {
-    AddCellEdges(geometry.cells, &graph.edges);
-    for (size_t v = 0; v < places.size(); ++v)
-      places[v] = PlaceOf(geometry.cells.vertex_key[static_cast<int64_t>(v)]);
   } else {
     AddGridEdges(geometry, vertex, &graph.edges);
     for (size_t v = 0; v < places.size(); ++v)

@@ -17,15 +17,14 @@ struct VoxelGraph {
   // Of each voxel, its edges: `edge_of[first_edge[v] .. first_edge[v + 1])`.
   std::vector<int64_t> first_edge;
   std::vector<int32_t> edge_of;
-  // Cubes of 2, 4, ... 64 voxels of the finest level: [levels][voxels], numbered from 0. Of
-  // splats 64 are as wide as the box.
+  // Cubes of 2, 4, ... 64 voxels: [levels][voxels], numbered from 0. Of splats 64 are as wide
+  // as the box.
   std::vector<std::vector<int32_t>> cubes;
 };
 
-// Neighbours are the stored ends of a cell's twelve edges; of a uniform grid that is the next
-// voxel along each axis; of splats, which have no lattice, the six whose means are nearest, in
-// the positions of FillFeatures, from either side. Texels of background spheres are no
-// voxels.
+// Neighbours are the stored voxels that are next to each other along an axis; of splats, which
+// have no lattice, the six whose means are nearest, in the positions of FillFeatures, from
+// either side. Texels of background spheres are no voxels.
 VoxelGraph GraphOf(const RadianceField& field);
 
 }  // namespace regrade

@@ -12,7 +12,6 @@
 #include "kernels/device/device_memory.h"
 #include "kernels/field/packed_grid.h"
 #include "kernels/network/cuda/device_mlp.h"
-#include "tests/support/cell_field.h"
 #include "tests/support/device_test.h"
 #include "tests/support/parity_row.h"
 #include "tests/support/small_field.h"
@@ -136,18 +135,16 @@ TEST_F(DeviceStyle, LargeMlpOfTwoChunks) { CheckMlp(70001, 9); }
 TEST_F(DeviceStyle, WideMlpLessThanATile) { CheckMlp(1, 16); }
 TEST_F(DeviceStyle, LargeWideMlpOfTwoChunks) { CheckMlp(70001, 16); }
 
-enum class Scene { kBall, kBallBeforeLayers, kCells, kSplats };
-constexpr const char* kSceneNames[] = {"", ", layers", ", cells", ", splats"};
+enum class Scene { kBall, kBallBeforeLayers, kSplats };
+constexpr const char* kSceneNames[] = {"", ", layers", ", splats"};
 
 // Of splats the largest has degree 3.
 std::vector<int> HarmonicsOf(Scene scene) {
   return scene == Scene::kSplats ? std::vector<int>{16, 9, 4, 1} : std::vector<int>{9, 4, 1};
 }
 
-// A ball of n voxels a side, one in front of background layers, cells of three sizes, or a ball
-// of n^3 / 2 splats.
+// A ball of n voxels a side, one in front of background layers, or a ball of n^3 / 2 splats.
 RadianceField FieldOf(Scene scene, int n, int basis) {
-  if (scene == Scene::kCells) return RandomCellField({4, 4, 4}, 2, basis, 81);
   if (scene == Scene::kSplats) return SplatBall(int64_t{n} * n * n / 2, 0.4f, basis);
   RadianceField field = Ball(n, basis);
   if (scene == Scene::kBallBeforeLayers) AddSpheres(40, 9, 0.7, 5, &field);
@@ -201,7 +198,6 @@ TEST_F(DeviceStyle, LossAndGradient) { CheckLossAndGradient(13, Scene::kBall); }
 TEST_F(DeviceStyle, LossAndGradientBeforeLayers) {
   CheckLossAndGradient(13, Scene::kBallBeforeLayers);
 }
-TEST_F(DeviceStyle, LossAndGradientOfCells) { CheckLossAndGradient(13, Scene::kCells); }
 TEST_F(DeviceStyle, LossAndGradientOfSplats) { CheckLossAndGradient(13, Scene::kSplats); }
 TEST_F(DeviceStyle, LargeLossAndGradientOfTwoBandsOfSplats) {
   CheckLossAndGradient(150, Scene::kSplats);
@@ -256,9 +252,6 @@ void CheckExactSums(int side, Scene scene, int basis = 9) {
 }
 
 TEST_F(DeviceStyle, H68_ExactSumsAreTheSameBitsInAnyOrder) { CheckExactSums(50, Scene::kBall); }
-TEST_F(DeviceStyle, H68_ExactSumsOfCellsAreTheSameBitsInAnyOrder) {
-  CheckExactSums(50, Scene::kCells);
-}
 TEST_F(DeviceStyle, H68_ExactSumsOfSplatsAreTheSameBitsInAnyOrder) {
   CheckExactSums(50, Scene::kSplats);
   CheckExactSums(50, Scene::kSplats, 16);
@@ -289,7 +282,6 @@ void CheckHiddenSums(Scene scene, int basis = 9) {
 
 TEST_F(DeviceStyle, HiddenSums) { CheckHiddenSums(Scene::kBall); }
 TEST_F(DeviceStyle, HiddenSumsBeforeLayers) { CheckHiddenSums(Scene::kBallBeforeLayers); }
-TEST_F(DeviceStyle, HiddenSumsOfCells) { CheckHiddenSums(Scene::kCells); }
 TEST_F(DeviceStyle, HiddenSumsOfSplats) {
   CheckHiddenSums(Scene::kSplats);
   CheckHiddenSums(Scene::kSplats, 16);
@@ -326,7 +318,6 @@ void CheckRestyle(Scene scene) {
 }
 
 TEST_F(DeviceStyle, Restyle) { CheckRestyle(Scene::kBallBeforeLayers); }
-TEST_F(DeviceStyle, RestyleOfCells) { CheckRestyle(Scene::kCells); }
 TEST_F(DeviceStyle, RestyleOfSplats) { CheckRestyle(Scene::kSplats); }
 
 }  // namespace

@@ -11,7 +11,6 @@
 #include "kernels/field/cpu/rays.h"
 #include "kernels/field/packed_grid.h"
 #include "kernels/field/render_ray.h"
-#include "tests/support/cell_field.h"
 #include "tests/support/derivative.h"
 #include "tests/support/double_field.h"
 #include "tests/support/small_field.h"
@@ -21,7 +20,6 @@ namespace {
 
 using testing::DerivativeBy;
 using testing::DoubleField;
-using testing::RandomCellField;
 using testing::RandomField;
 using testing::RandomRays;
 using testing::ToDouble;
@@ -31,23 +29,13 @@ double LossesOf(const FieldView<double>& field, const RayT<double>& ray,
                 const MarchOptions& options, const DensityLosses& losses) {
   const RayResult<double> result = RenderRay(field, ray, options);
   double sum = double{losses.beta} * BetaLoss(std::exp(-result.optical_depth));
-  const auto add = [&](double density) {
-    if (density > 0) sum += double{losses.sparsity} * SparsityLoss(density);
-  };
-  if (field.cells.top != nullptr) {
-    std::vector<CompositedCell<double>> samples;
-    MarchCells(field.frame, field.cells, field.density, ray, 0.0,
-               double{options.stop_transmittance}, &samples);
-    for (const auto& sample : samples) add(sample.density);
-    return sum;
-  }
   const GridRay<double> march = ClipToGrid(field.frame, ray, 0.0, double{options.step});
   for (int64_t i = 0; i <= result.last_step; ++i) {
     double density;
     const double t = march.t_begin + static_cast<double>(i) * double{options.step};
     Interpolate(field.frame, field.links, field.density, 1, 1,
                 LocateCell(field.frame, march.At(t)), &density);
-    add(density);
+    if (density > 0) sum += double{losses.sparsity} * SparsityLoss(density);
   }
   return sum;
 }
@@ -65,76 +53,70 @@ TEST(DensityLosses, BetaPushesToBothEnds) {
   EXPECT_EQ(DensityLossSlope(DensityLosses(), 0.3, 2.0, 0.1), 0);
 }
 
-// Relative error 1e-8, as FieldGradient.AdjointEqualsDerivativeInDouble, on both kinds of
-// field.
+// Relative error 1e-8, as FieldGradient.AdjointEqualsDerivativeInDouble.
 TEST(DensityLosses, AdjointEqualsDerivativeInDouble) {
-  for (const RadianceField& field :
-       {RandomField({5, 6, 4}, 1, 0.8, 21), RandomCellField({2, 2, 2}, 1, 1, 41)}) {
-    DoubleField d(field);
-    const MarchOptions options{0.5f, 1e-3f};
-    int checked = 0;
-    for (const Ray& ray_f : RandomRays(12, 22)) {
-      const RayT<double> ray = ToDouble(ray_f);
-      const RayResult<double> result = RenderRay(d.view(), ray, options);
-      std::vector<double> d_density(d.density.size()), d_sh(d.sh.size());
-      RenderRayAdjoint<double>(d.view(), ray, options, result, {}, d_density.data(),
-                               d_sh.data(), PlainAdd(), nullptr, nullptr, kLosses);
-      const auto loss = [&] { return LossesOf(d.view(), ray, options, kLosses); };
-      for (size_t i = 0; i < d.density.size(); ++i) {
-        const double numeric = DerivativeBy(&d.density[i], loss, 2e-4, testing::kKink);
-        if (std::isnan(numeric)) continue;  // no derivative to compare
-        EXPECT_NEAR(numeric, d_density[i], 1e-8 * (1 + std::abs(d_density[i])));
-        checked += d_density[i] != 0;
-      }
-      EXPECT_EQ(std::ranges::count(d_sh, 0.0), std::ssize(d_sh));
+  const RadianceField field = RandomField({5, 6, 4}, 1, 0.8, 21);
+  DoubleField d(field);
+  const MarchOptions options{0.5f, 1e-3f};
+  int checked = 0;
+  for (const Ray& ray_f : RandomRays(12, 22)) {
+    const RayT<double> ray = ToDouble(ray_f);
+    const RayResult<double> result = RenderRay(d.view(), ray, options);
+    std::vector<double> d_density(d.density.size()), d_sh(d.sh.size());
+    RenderRayAdjoint<double>(d.view(), ray, options, result, {}, d_density.data(), d_sh.data(),
+                             PlainAdd(), nullptr, nullptr, kLosses);
+    const auto loss = [&] { return LossesOf(d.view(), ray, options, kLosses); };
+    for (size_t i = 0; i < d.density.size(); ++i) {
+      const double numeric = DerivativeBy(&d.density[i], loss, 2e-4, testing::kKink);
+      if (std::isnan(numeric)) continue;  // no derivative to compare
+      EXPECT_NEAR(numeric, d_density[i], 1e-8 * (1 + std::abs(d_density[i])));
+      checked += d_density[i] != 0;
     }
-    EXPECT_GT(checked, 100);
+    EXPECT_EQ(std::ranges::count(d_sh, 0.0), std::ssize(d_sh));
   }
+  EXPECT_GT(checked, 100);
 }
 
 // Float gradients against the plain adjoint in double: 1e-4 of the largest entry.
 TEST(DensityLosses, FastPathsEqualThePlainAdjoint) {
-  for (const RadianceField& field :
-       {RandomField({9, 8, 10}, 4, 0.7, 41), RandomCellField({2, 2, 2}, 2, 4, 41)}) {
-    const DoubleField d(field);
-    const FastGrid grid = MakeFastGrid(field);
-    const std::vector<Ray> rays = RandomRays(200, 42);
-    const std::vector<Vec3f> targets(rays.size(), Vec3f{0.4f, 0.5f, 0.2f});
-    const MarchOptions options{0.5f, 1e-4f};
-    const float scale = 1.0f / 600;
-    std::vector<double> d_density(d.density.size()), d_sh(d.sh.size()), without;
-    for (const DensityLosses& losses : {DensityLosses(), kLosses}) {
-      without = d_density;
-      std::ranges::fill(d_density, 0);
-      for (size_t r = 0; r < rays.size(); ++r) {
-        const RayT<double> ray = ToDouble(rays[r]);
-        const RayResult<double> result = RenderRay(d.view(), ray, options);
-        RenderRayAdjoint<double>(d.view(), ray, options, result,
-                                 (result.color - targets[r].Cast<double>()) * (2.0 * scale),
-                                 d_density.data(), d_sh.data(), PlainAdd(), nullptr, nullptr,
-                                 losses);
-      }
+  const RadianceField field = RandomField({9, 8, 10}, 4, 0.7, 41);
+  const DoubleField d(field);
+  const FastGrid grid = MakeFastGrid(field);
+  const std::vector<Ray> rays = RandomRays(200, 42);
+  const std::vector<Vec3f> targets(rays.size(), Vec3f{0.4f, 0.5f, 0.2f});
+  const MarchOptions options{0.5f, 1e-4f};
+  const float scale = 1.0f / 600;
+  std::vector<double> d_density(d.density.size()), d_sh(d.sh.size()), without;
+  for (const DensityLosses& losses : {DensityLosses(), kLosses}) {
+    without = d_density;
+    std::ranges::fill(d_density, 0);
+    for (size_t r = 0; r < rays.size(); ++r) {
+      const RayT<double> ray = ToDouble(rays[r]);
+      const RayResult<double> result = RenderRay(d.view(), ray, options);
+      RenderRayAdjoint<double>(d.view(), ray, options, result,
+                               (result.color - targets[r].Cast<double>()) * (2.0 * scale),
+                               d_density.data(), d_sh.data(), PlainAdd(), nullptr, nullptr,
+                               losses);
     }
-    double largest = 0, change = 0;
-    for (size_t v = 0; v < d_density.size(); ++v) {
-      largest = std::max(largest, std::abs(d_density[v]));
-      change = std::max(change, std::abs(d_density[v] - without[v]));
-    }
-    EXPECT_GT(change, 0.1 * largest);  // the losses count here
-    for (const char* name : {"baseline", "avx2", "avx512"}) {
-      const FastRayFunctions* functions = FastRaysFor(name);
-      if (functions == nullptr) continue;
-      GradientArena arena;
-      arena.Reset(grid.num_voxels());
-      functions->accumulate(grid, {rays.data(), targets.data(), 200, kLosses}, options, scale,
-                            &arena);
-      for (int64_t v = 0; v < grid.num_voxels(); ++v) {
-        const int32_t slot = arena.slot_of_voxel[v];
-        const double fast =
-            slot < 0 ? 0
-                     : arena.gradient[int64_t{slot} * grid.lanes() + DensityLane(grid.basis)];
-        ASSERT_NEAR(fast, d_density[static_cast<size_t>(v)], 1e-4 * largest) << name;
-      }
+  }
+  double largest = 0, change = 0;
+  for (size_t v = 0; v < d_density.size(); ++v) {
+    largest = std::max(largest, std::abs(d_density[v]));
+    change = std::max(change, std::abs(d_density[v] - without[v]));
+  }
+  EXPECT_GT(change, 0.1 * largest);  // the losses count here
+  for (const char* name : {"baseline", "avx2", "avx512"}) {
+    const FastRayFunctions* functions = FastRaysFor(name);
+    if (functions == nullptr) continue;
+    GradientArena arena;
+    arena.Reset(grid.num_voxels());
+    functions->accumulate(grid, {rays.data(), targets.data(), 200, kLosses}, options, scale,
+                          &arena);
+    for (int64_t v = 0; v < grid.num_voxels(); ++v) {
+      const int32_t slot = arena.slot_of_voxel[v];
+      const double fast =
+          slot < 0 ? 0 : arena.gradient[int64_t{slot} * grid.lanes() + DensityLane(grid.basis)];
+      ASSERT_NEAR(fast, d_density[static_cast<size_t>(v)], 1e-4 * largest) << name;
     }
   }
 }

@@ -1,12 +1,14 @@
-// Parts of the fast path that differ from the specification: vectorised opacities, and
-// skipping.
+// Parts of the fast path that differ from the specification: vectorised opacities, skipping,
+// and the largest weights of voxels.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <vector>
 
 #include "kernels/field/cpu/rays.h"
 #include "kernels/field/packed_grid.h"
+#include "kernels/field/ray_weights.h"
 #include "kernels/field/render_ray.h"
 #include "tests/support/record_error.h"
 #include "tests/support/small_field.h"
@@ -73,6 +75,33 @@ TEST(FastRays, H84_SkippingLosesNoVoxel) {
       seen += plain.transmittance < 0.99f;
     }
     EXPECT_GT(seen, 100);
+  }
+}
+
+// A voxel's weight is the largest one of the samples that it is a corner of.
+TEST(FastRays, LargestWeightsAreThoseOfTheSamples) {
+  const RadianceField field = RandomField({9, 8, 10}, 4, 0.6, 35);
+  const FastGrid grid = MakeFastGrid(field);
+  const std::vector<Ray> rays = RandomRays(400, 36);
+  const int64_t n = static_cast<int64_t>(rays.size());
+  const MarchOptions options{0.5f, 1e-4f};
+  std::vector<float> expected(static_cast<size_t>(grid.num_voxels()));
+  const RayWeights weights =
+      ComputeRayWeights(*field.geometry, {rays.data(), n}, options, field.near_clip);
+  for (const WeightedSample& sample : weights.samples) {
+    int32_t points[8];
+    CornerPoints(*field.geometry, sample, points);
+    for (const int32_t point : points)
+      if (point >= 0)
+        expected[static_cast<size_t>(point)] =
+            std::max(expected[static_cast<size_t>(point)], sample.weight);
+  }
+  for (const char* name : {"baseline", "avx2", "avx512"}) {
+    const FastRayFunctions* functions = FastRaysFor(name);
+    if (functions == nullptr) continue;
+    std::vector<float> most(expected.size());
+    functions->max_weights(grid, rays.data(), n, options, most.data());
+    for (size_t v = 0; v < most.size(); ++v) ASSERT_NEAR(most[v], expected[v], 2e-5) << name;
   }
 }
 

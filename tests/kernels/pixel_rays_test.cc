@@ -40,31 +40,6 @@ TEST(PinholeRays, EqualTheCamerasRays) {
   }
 }
 
-// The direction to a point of a ray is the ray's, near, far, and in NDC at infinity.
-TEST(PinholeRays, TheDirectionToAPointOfARayIsItsOwn) {
-  Camera camera = SmallCamera();
-  camera.camera_from_world.translation = {0.3, -0.2, 0.4};
-  for (const bool ndc : {false, true}) {
-    if (ndc) camera.ndc = {2 * 37.0 / 40, 2 * 39.0 / 30};
-    const PinholeRays rays(camera);
-    for (int y = 0; y < camera.height; y += 3)
-      for (int x = 0; x < camera.width; x += 3) {
-        const Ray ray = rays.At(x, y);
-        const Vec3d origin = ray.origin.Cast<double>(),
-                    direction = ray.direction.Cast<double>();
-        // In NDC z = 1, the end of the box, is at infinity.
-        const double last = ndc ? (1 - origin.z) / direction.z : 50;
-        for (const double t : {0.05 * last, 0.5 * last, last}) {
-          const Vec3f to = rays.DirectionTo(origin + direction * t);
-          for (int a = 0; a < 3; ++a)
-            ASSERT_NEAR(to[a], ray.direction[a], 2e-6) << x << " " << y;
-        }
-      }
-  }
-  camera.camera_from_world.translation.z = -0.5;  // the point's world z is 2 / 31
-  EXPECT_EQ(PinholeRays(camera).DirectionTo({0, 0, -30}), (Vec3f{0, 0, 0}));
-}
-
 // Every vertex has a place, and no two have the same.
 TEST(BrickOrder, IndexesEveryVertexOnce) {
   for (const Vec3i n : {Vec3i{5, 7, 9}, Vec3i{4, 8, 4}, Vec3i{2, 3, 13}}) {

@@ -3,12 +3,10 @@
 
 #include <gtest/gtest.h>
 
-#include <cmath>
+#include <algorithm>
 #include <memory>
-#include <vector>
 
 #include "kernels/field/render_ray.h"
-#include "tests/support/cell_field.h"
 #include "tests/support/small_field.h"
 
 namespace regrade {
@@ -20,33 +18,13 @@ double Matter(const RadianceField& field) {
   const Vec3f scale = geometry.frame.Scale();
   const double voxel = 1 / (double{scale.x} * double{scale.y} * double{scale.z});
   double sum = 0;
-  if (!geometry.cells.on()) {
-    for (int64_t v = 0; v < geometry.num_voxels(); ++v)
-      sum += std::max(0.0, double{geometry.density[v]}) * voxel;
-    return sum;
-  }
-  constexpr int kParts = 6;  // of a cell's edge
-  const CellGrid& cells = geometry.cells;
-  for (int64_t i = 0; i < cells.num_cells(); ++i)
-    for (int part = 0; part < kParts * kParts * kParts; ++part) {
-      const int at[3] = {part / kParts / kParts, part / kParts % kParts, part % kParts};
-      double density = 0;
-      for (int k = 0; k < 8; ++k) {
-        double weight = geometry.density[cells.corner[8 * i + k]];
-        for (int a = 0; a < 3; ++a) {
-          const double f = (at[a] + 0.5) / kParts;
-          weight *= (k >> (2 - a) & 1) == 1 ? f : 1 - f;
-        }
-        density += weight;
-      }
-      sum += std::max(density, 0.0) / std::pow(kParts, 3) * voxel *
-             std::pow(8, cells.finest - cells.level[i]);
-    }
+  for (int64_t v = 0; v < geometry.num_voxels(); ++v)
+    sum += std::max(0.0, double{geometry.density[v]}) * voxel;
   return sum;
 }
 
 TEST(CoarseField, HasTheBoxAndTheMatterOfTheField) {
-  for (RadianceField field : {testing::RandomCellField({2, 3, 2}, 3, 9, 5),
+  for (RadianceField field : {testing::RandomField({16, 24, 16}, 9, 0.5, 5),
                               testing::RandomField({13, 17, 9}, 4, 0.5, 6)}) {
     field.near_clip = 0.25f;
     const auto coarse = CoarseField(field, {.most_part = 10});
@@ -59,7 +37,7 @@ TEST(CoarseField, HasTheBoxAndTheMatterOfTheField) {
       EXPECT_NEAR(wide.center[a] - wide.radius[a], fine.center[a] - fine.radius[a], 1e-5);
       EXPECT_GE(wide.center[a] + wide.radius[a], fine.center[a] + fine.radius[a] - 1e-5);
     }
-    // Eight samples a cell, sums in float, and voxels that are all but empty are left out.
+    // Sums are in float, and voxels that are all but empty are left out.
     EXPECT_NEAR(Matter(*coarse) / Matter(field), 1, 0.05);
   }
 }
@@ -89,7 +67,7 @@ TEST(CoarseField, AWallStaysOpaqueAndKeepsItsColour) {
 }
 
 TEST(CoarseField, SmallFieldsHaveNone) {
-  const RadianceField field = testing::RandomCellField({2, 3, 2}, 3, 9, 5);
+  const RadianceField field = testing::RandomField({16, 24, 16}, 9, 0.5, 5);
   EXPECT_FALSE(CoarseField(field, {.most_part = 0.001}).has_value());
   EXPECT_FALSE(CoarseField(field, {.most_voxels = 0}).has_value());
 }

@@ -202,22 +202,16 @@ TEST(Prediction, AppliesMeasuredUnitCostsToAnotherCapture) {
   EXPECT_NEAR(times[0].seconds, 0.6 * truth(larger, other) + 3.5 * 2 + 1, 1e-6);
 }
 
-// Nine of ten photos of 400 x 300 are fitted with --holdout 10: their 1.08 million pixels
-// determine cells of a 519th, so that the stages of 768 and of 1536 are left out.
-TEST(Prediction, StagesThatTheFitLeavesOutDoNotCount) {
+// Nine of ten photos of 400 x 300 are fitted with --holdout 10.
+TEST(Prediction, RayVoxelsAreOfAllStages) {
   RunSettings settings;
-  settings.fit.resolutions = {48, 96, 192, 384, 768, 1536};
-  settings.fit.steps = {1, 1, 1, 1, 50, 100};
+  settings.fit.resolutions = {48, 96, 192};
+  settings.fit.steps = {1, 1, 50};
   settings.run.holdout = 10;
   const Capture capture = Photos(10);
   EXPECT_EQ(PlaceOf(settings, capture).pixels, 9 * 400 * 300);
   EXPECT_EQ(PlaceOf(settings, capture).photos, 9);
-  EXPECT_EQ(AmountOf("ray voxels", settings, capture), 4096.0 * (48 + 96 + 192 + 384));
-  settings.scene.photo_size = 200;  // 260: without the stage of 384, too
-  EXPECT_EQ(AmountOf("ray voxels", settings, capture), 4096.0 * (48 + 96 + 192));
-  settings.fit.fewer_stages = false;
-  EXPECT_EQ(AmountOf("ray voxels", settings, capture),
-            4096.0 * (48 + 96 + 192 + 384 + 50 * 768 + 100 * 1536));
+  EXPECT_EQ(AmountOf("ray voxels", settings, capture), 4096.0 * (48 + 96 + 50 * 192));
 }
 
 // Half of the steps are half of the work, and costs of splats say nothing of voxels.
@@ -259,20 +253,6 @@ TEST(DurationEstimate, ImprovesWithTheFirstMeasurement) {
   estimate.Add({"fit", "", "", 0, 10, 15, 26});
   EXPECT_NEAR(estimate.Seconds(own), 10, 1e-9);
   EXPECT_NEAR(estimate.Seconds(twice), 20, 1e-6);
-}
-
-TEST(DurationEstimate, StagesThatTheFitLeavesOutTakeNoTime) {
-  RunSettings base;
-  base.fit.resolutions = {48, 96, 192};
-  base.fit.steps = {100, 100, 100};
-  const auto seconds = [&base](int64_t pixels) {
-    return DurationEstimate(
-               base, {},
-               [pixels](const RunSettings&) { return FitPlace{.pixels = pixels, .photos = 4}; })
-        .Seconds(FitVariant("", ""));
-  };
-  const double all = seconds(4 * 192 * 192), two = seconds(4 * 192 * 192 - 1);
-  EXPECT_NEAR(two / all, (48 + 96) / (48.0 + 96 + 192), 1e-9);
 }
 
 }  // namespace

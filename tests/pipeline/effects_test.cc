@@ -41,16 +41,15 @@ const std::vector<std::string> kCoarse = {"--fit-resolutions", "24,48", "--fit-s
 // A voxel of the forward-facing wall is as large as a pixel.
 const std::vector<std::string> kFine = {"--fit-resolutions", "32,72", "--fit-steps", "150,300"};
 
-// `regrade reconstruct --reproducible` at sizes of seconds, of a uniform field: the gains below
-// were seen with it, and an adaptive field needs more steps than these.
+// `regrade reconstruct --reproducible` of voxels, at sizes of seconds: the gains below were
+// seen with them.
 Reconstruction Reconstruct(const std::string& capture, const std::string& out,
                            const std::vector<std::string>& size,
                            const std::vector<std::string>& more = {}) {
   ChildOptions options;
   options.argv = {
       REGRADE_PROGRAM,  "reconstruct", capture,  "--out",    out,
-      "--reproducible", "--field",     "voxels", "--config", R"({"fit-rays": 2048})",
-      "--fit-field",    "uniform"};
+      "--reproducible", "--field",     "voxels", "--config", R"({"fit-rays": 2048})"};
   options.argv.insert(options.argv.end(), size.begin(), size.end());
   options.argv.insert(options.argv.end(), more.begin(), more.end());
   options.wall_limit_s = 300;

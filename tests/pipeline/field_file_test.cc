@@ -341,6 +341,9 @@ TEST_F(Changed, F66_ShapesThatDisagree) {
 }
 
 TEST_F(Changed, UnsupportedFieldsAreNamed) {
+  const int32_t of_cells = 2;
+  EXPECT_REGRADE_ERROR(ReadWith("regrade_version", {}, &of_cells), ExitCode::kInput,
+                       "has cells, which this version does not read");
   const int64_t learned = 4;
   EXPECT_REGRADE_ERROR(ReadWith("basis_type", {}, &learned), ExitCode::kInput,
                        "not spherical harmonics");

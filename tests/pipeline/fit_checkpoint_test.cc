@@ -3,6 +3,9 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <functional>
+#include <optional>
+#include <string>
 
 #include "tests/support/small_field.h"
 
@@ -20,6 +23,37 @@ FitState StateOf(const RadianceField& field) {
   state.step = 17;
   state.tally = {1.5, 2.5, 3, 4, 5, 6, 7, {{8, 9.5, 10.5, 11}, {12, 13.5, 14.5, 15}}};
   return state;
+}
+
+TEST(FitCheckpoint, AGridComesBackBitForBit) {
+  FitState state = StateOf(testing::RandomField({5, 4, 6}, 4, 0.5, 1));
+  for (int64_t i = 0; i < state.second_moment.size(); ++i)
+    state.second_moment[i] = 0.5f + static_cast<float>(i);
+  const std::string bytes = PackFitState(state, "a note").Joined();
+  std::string note;
+  const std::optional<FitState> back = UnpackFitState(bytes, &note);
+  ASSERT_TRUE(back);
+  EXPECT_EQ(note, "a note");
+  const auto same = [](const auto& a, const auto& b) {
+    return std::equal(a.begin(), a.end(), b.begin(), b.end());
+  };
+  EXPECT_TRUE(same(back->grid.links, state.grid.links));
+  EXPECT_TRUE(same(back->grid.records, state.grid.records));
+  EXPECT_TRUE(same(back->second_moment, state.second_moment));
+  EXPECT_TRUE(same(back->grid.brick_distance, state.grid.brick_distance));
+  EXPECT_FALSE(UnpackFitState(bytes + '\0'));
+  std::string of_cells = bytes;
+  of_cells[0] = 3;
+  EXPECT_FALSE(UnpackFitState(of_cells));
+  const auto unpacks = [&state](const std::function<void(FastGrid*)>& damage) {
+    FitState damaged = state;
+    damage(&damaged.grid);
+    return UnpackFitState(PackFitState(damaged).Joined()).has_value();
+  };
+  EXPECT_TRUE(unpacks([](FastGrid*) {}));
+  EXPECT_FALSE(unpacks([](FastGrid* grid) { grid->frame.resolution.y = 1 << 24; }));
+  EXPECT_FALSE(unpacks([](FastGrid* grid) { grid->links[0] = 1 << 20; }));
+  EXPECT_FALSE(unpacks([](FastGrid* grid) { grid->records.Resize(grid->records.size() - 1); }));
 }
 
 TEST(FitCheckpoint, BackgroundSpheresComeBackBitForBit) {

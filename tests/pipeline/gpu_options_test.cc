@@ -47,7 +47,8 @@ TEST(GpuOptions, APresetSetsTheEffortAndNoFile) {
     ASSERT_TRUE(settings.Bind(command, &options));
     ReadFlags({"--capture", "a.npz", "--preset", "best"}, &options);
     EXPECT_EQ(settings.fit_packed.out + settings.fit_splats.out, "");
-    EXPECT_EQ(settings.fit.max_cells, command == "fit" ? 20.0f : FitOptions().max_cells);
+    EXPECT_EQ(settings.fit.resolutions.back(),
+              command == "fit" ? 512 : FitOptions().resolutions.back());
     EXPECT_EQ(settings.splats.steps, command == "splats" ? 10000 : SplatFitOptions().steps);
   }
 }

@@ -33,10 +33,9 @@ TEST(MixCommand, AStyleMayKnowDirectionsThatItsSceneDoesNot) {
   const TemporaryFolder folder;
   const std::string style = testing::SourceDir() + "/assets/style_sunset.png";
   testing::WriteCapture(folder / "s", 6, "96x72");
-  std::vector<std::string> run{"run", folder / "s/truth", "--style", style, "--out",
-                               folder / "e", "--effects", "view-dependence=off",
-                               // 30 steps of an adaptive field leave too little to learn from.
-                               "--fit-field", "uniform", "--keep-field"};
+  std::vector<std::string> run{
+      "run",       folder / "s/truth",    "--style",     style, "--out", folder / "e",
+      "--effects", "view-dependence=off", "--keep-field"};
   for (const std::string& flag : testing::TinyFlags("voxels")) run.push_back(flag);
   const ProgramOutcome done = Regrade(run);
   ASSERT_EQ(done.code, 0) << done.text;

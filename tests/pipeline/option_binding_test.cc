@@ -19,7 +19,6 @@ struct Sample {
   int64_t big = 1;
   uint64_t seed = 0;
   float step = 0.1f;
-  std::optional<float> weight;
   double rate = 1e-3;
   std::string name = "none";
   std::string method = "mkl";
@@ -34,7 +33,6 @@ struct Sample {
     bind("big", big, {});
     bind("seed", seed, {});
     bind("step", step, {.unit = "voxels", .help = "along a ray", .min = 0.1, .max = 4});
-    bind("weight", weight, {.min = 0});
     bind("rate", rate, {.min = 0});
     bind("name", name, {});
     bind("method", method, {.choices = "mkl|reinhard"});
@@ -56,19 +54,6 @@ class Options : public ::testing::Test {
   Sample sample_;
   OptionSet set_;
 };
-
-TEST_F(Options, AMissingValueIsAuto) {
-  Parse({"--weight", "0.05"});
-  EXPECT_EQ(sample_.weight, 0.05f);
-  EXPECT_EQ(set_.Values().At("weight").AsDouble(), 0.05);
-  Parse({"--weight", "auto"});
-  EXPECT_EQ(sample_.weight, std::nullopt);
-  const JsonValue values = set_.Values();
-  Parse({"--weight", "2"});
-  set_.ApplyConfig(values, "run.json");
-  EXPECT_EQ(sample_.weight, std::nullopt);
-  EXPECT_THROW(Parse({"--weight", "much"}), Error);
-}
 
 TEST_F(Options, AllFormsOfValues) {
   const auto words = Parse({"photos", "--rays", "100", "--step=2.5", "--flag", "--no-quiet",

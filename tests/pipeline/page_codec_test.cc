@@ -10,14 +10,12 @@
 #include "pipeline/files/deflate.h"
 #include "pipeline/page/field_codec.h"
 #include "pipeline/page/value_codec.h"
-#include "tests/support/cell_field.h"
 #include "tests/support/expect_error.h"
 #include "tests/support/small_field.h"
 
 namespace regrade {
 namespace {
 
-using testing::RandomCellField;
 using testing::RandomField;
 
 constexpr double kStep = 0.03;  // regrade page's
@@ -25,7 +23,6 @@ constexpr double kStep = 0.03;  // regrade page's
 std::vector<std::pair<const char*, RadianceField>> Fields() {
   std::vector<std::pair<const char*, RadianceField>> fields;
   for (const int basis : {1, 4, 9}) {
-    fields.emplace_back("levels", RandomCellField({2, 3, 2}, 3, basis, 5));
     fields.emplace_back("uniform", RandomField({13, 17, 9}, basis, 0.5, 6));
     fields.emplace_back("spheres", RandomField({9, 8, 11}, basis, 0.6, 7));
     testing::AddSpheres(5, 12, 0.7, 8, &fields.back().second);
@@ -60,12 +57,11 @@ TEST(PageCodec, DecodedFieldRendersAsTheExactOne) {
 }
 
 TEST(PageCodec, WhatNoRayCanSeeIsLeftOut) {
-  RadianceField field = RandomCellField({2, 2, 2}, 3, 4, 9);
+  RadianceField field = RandomField({16, 16, 16}, 4, 0.7, 9);
   const size_t all = EncodeField(field, kStep).bytes();
   auto geometry = std::make_shared<Geometry>(*field.geometry);
-  const CellGrid& cells = geometry->cells;
-  for (int64_t v = 0; v < geometry->density.size(); ++v)
-    if (PlaceOf(cells.vertex_key[v]).x < 8) geometry->density[v] = -1;
+  for (int64_t at = 0; at < geometry->frame.Vertex(8, 0, 0); ++at)
+    if (geometry->links[at] >= 0) geometry->density[geometry->links[at]] = -1;
   field.geometry = geometry;
   const PageField page = EncodeField(field, kStep);
   EXPECT_LT(static_cast<double>(page.bytes()), 0.8 * static_cast<double>(all));
@@ -84,7 +80,7 @@ TEST(PageCodec, CopyOfACopyHasTheSamePlaces) {
 }
 
 TEST(PageCodec, EqualFieldsGiveEqualBytes) {
-  const RadianceField field = RandomCellField({2, 2, 2}, 2, 9, 11);
+  const RadianceField field = RandomField({8, 8, 8}, 9, 0.7, 11);
   const PageField a = EncodeField(field, kStep), b = EncodeField(field, kStep);
   EXPECT_EQ(DumpJson(a.header), DumpJson(b.header));
   ASSERT_EQ(a.sections.size(), b.sections.size());

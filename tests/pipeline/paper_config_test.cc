@@ -131,7 +131,6 @@ TEST(PaperConfig, ResolvedSettingsAreThePublishedOnes) {
     SCOPED_TRACE(p.name);
     const RunSettings settings = Of({"--preset", "paper", "--paper-config", p.name});
     const FitOptions& fit = settings.fit;
-    EXPECT_EQ(fit.field, "uniform");
     EXPECT_EQ(fit.resolutions, p.x);
     EXPECT_EQ(fit.resolutions_y, p.y);
     EXPECT_EQ(fit.resolutions_z, p.z);
@@ -140,8 +139,8 @@ TEST(PaperConfig, ResolvedSettingsAreThePublishedOnes) {
     const double done = Steps(fit) / fit.rate_steps;
     EXPECT_EQ(fit.rate_density, 30.0f);
     EXPECT_EQ(fit.rate_sh, 1e-2f);
-    ExpectPrinted(ExponentialRate(*fit.rate_density, *fit.rate_density_end, done),
-                  p.density_rate, "rate of densities at the end");
+    ExpectPrinted(ExponentialRate(fit.rate_density, fit.rate_density_end, done), p.density_rate,
+                  "rate of densities at the end");
     ExpectPrinted(ExponentialRate(fit.rate_sh, fit.rate_sh_end, done), p.sh_rate,
                   "rate of colours at the end");
     const bool background = p.sphere_rate > 0;
@@ -172,8 +171,8 @@ TEST(PaperConfig, ResolvedSettingsAreThePublishedOnes) {
     EXPECT_EQ(fit.max_voxels, 44.0f);
     for (size_t s = 0; s < p.tv_density.size(); ++s) {
       const float decay = std::pow(fit.tv_decay, static_cast<float>(s));
-      EXPECT_FLOAT_EQ(*fit.tv_density * decay, static_cast<float>(p.tv_density[s])) << s;
-      EXPECT_FLOAT_EQ(*fit.tv_sh * decay, static_cast<float>(p.tv_sh[s])) << s;
+      EXPECT_FLOAT_EQ(fit.tv_density * decay, static_cast<float>(p.tv_density[s])) << s;
+      EXPECT_FLOAT_EQ(fit.tv_sh * decay, static_cast<float>(p.tv_sh[s])) << s;
     }
     EXPECT_EQ(fit.tv_fraction, 0.01f);
     EXPECT_EQ(fit.sparsity_loss, static_cast<float>(p.sparsity));
@@ -229,14 +228,12 @@ TEST(PaperConfig, ContradictionsAreRefused) {
   EXPECT_REGRADE_ERROR(ChoosePaperConfig("syn", {}), ExitCode::kUsage, "auto");
   EXPECT_REGRADE_ERROR(ChoosePaperConfig("llff", {.transparent = true}), ExitCode::kUsage,
                        "custom");
-  EXPECT_REGRADE_ERROR(Of({"--preset", "paper", "--fit-field", "adaptive"}), ExitCode::kUsage,
-                       "--fit-field");
   EXPECT_REGRADE_ERROR(Of({"--paper-config", "llff"}), ExitCode::kUsage, "--preset paper");
   EXPECT_REGRADE_ERROR(Of({"--preset", "paper", "--paper-config", "co3d"}), ExitCode::kUsage,
                        "llff");
   EXPECT_REGRADE_ERROR(
       Of({"--field", "voxels", "--config", R"({"fit-resolutions-y": [64, 64, 64, 64, 64]})"}),
-      ExitCode::kUsage, "uniform");
+      ExitCode::kUsage, "5 sides for 3 stages");
 }
 
 // Another preset undoes all of it.

@@ -14,7 +14,6 @@ constexpr uint64_t kProgram = static_cast<uint64_t>(kProgramBytes);
 
 FitOptions Fit(const std::vector<int>& resolutions, const std::vector<int>& steps) {
   FitOptions options;
-  options.MakeUniform();
   options.resolutions = resolutions;
   options.steps = steps;
   options.rays_per_step = 10500;
@@ -36,6 +35,15 @@ TEST(Plan, LaterStagesStoreAFraction) {
   // A coarse stage in full can be the peak: 0.4 * 110^3 < 100^3.
   EXPECT_EQ(PlanFit(Fit({100, 110}, {10, 10}), 0, kCube, 2).memory,
             PlanFit(Fit({100}, {10}), 0, kCube, 2).memory);
+}
+
+TEST(Plan, PruningRaisesItsLimitToTheMostVoxels) {
+  FitOptions fit = Fit({100, 200}, {10, 10});
+  EXPECT_NEAR(PlannedVoxels(fit, kCube, 0), 1e6, 1e-3);
+  EXPECT_NEAR(PlannedVoxels(fit, kCube, 1), 3.2e6, 1e-3);
+  fit.max_voxels = 2;
+  EXPECT_NEAR(PlannedVoxels(fit, kCube, 0), 1e6, 1e-3);
+  EXPECT_NEAR(PlannedVoxels(fit, kCube, 1), 2e6, 1e-3);
 }
 
 TEST(Plan, MemoryFollowsBoxDegreeAndThreads) {
@@ -89,6 +97,12 @@ TEST(StageEstimate, FollowsSizesAndTheMachinesPace) {
   EXPECT_GT(seconds(longer, size, "render"), 1.3 * seconds(settings, size, "render"));
   EXPECT_NEAR(SecondsOf(EstimateStages(settings, size, Backend::kCpu, 4), "render", "render"),
               0.5 * seconds(settings, size, "render"), 1e-9);
+  // A page of voxels takes as long as there are many.
+  RunSettings finer = settings;
+  finer.fit.resolutions.back() *= 2;
+  EXPECT_GT(seconds(finer, size, "report"), seconds(settings, size, "report") + 10);
+  finer.scene.field = settings.scene.field = "splats";
+  EXPECT_EQ(seconds(finer, size, "report"), seconds(settings, size, "report"));
   // A machine of half the speed, and one whose record is no measure.
   EXPECT_NEAR(MeasuredPace(stages, {{"reconstruct", 2 * stages[1].seconds}}), 2, 1e-9);
   EXPECT_EQ(MeasuredPace(stages, {{"reconstruct", 1e-3 * stages[1].seconds}}), 0.25);
@@ -145,23 +159,6 @@ TEST(Plan, DeviceMemoryByHand) {
   const StagePlan two = PlanFitOnDevice(Fit({100, 200}, {10, 10}), 0, kCube);
   EXPECT_EQ(two.memory, 1000000u * (3 * 128 + 4 + 10 + 4) + 3200000u * (3 * 128 + 4) +
                             8000000u * 10 + (1u << 30));
-}
-
-// 1.2 vertices a cell: three records of 128 B, density, rate and key; 45 B a cell. Beside them
-// the samples of rays and statistics, or the field before: one record of it, and its cells.
-TEST(Plan, DeviceMemoryOfAnAdaptiveFieldByHand) {
-  FitOptions fit = Fit({100, 400}, {10, 10});
-  fit.field = "auto";
-  fit.max_cells = 20;
-  const double cell = 1.2 * (3 * 128 + 16) + 45, before = 1.2 * (128 + 16) + 45;
-  const auto memory = [&] {
-    return static_cast<double>(PlanFitOnDevice(fit, 0, kCube).memory);
-  };
-  EXPECT_NEAR(memory(), 4e6 * (cell + 24) + (1 << 30), 2);
-  fit.resolutions = {200, 1000};
-  EXPECT_NEAR(memory(), 20e6 * (cell + 1.2 * 8) + 8e6 * before, 2);
-  fit.sh_degree = 0;  // records of 16 B: the sort of corners takes more than the field
-  EXPECT_NEAR(memory(), 20e6 * (13 + 8 * 36) + 8e6 * (1.2 * (16 + 16) + 45), 2);
 }
 
 TEST(Plan, TooLittleMemoryNamesWhatToLower) {
@@ -221,37 +218,6 @@ TEST(Plan, AFitIsLoweredToItsLimit) {
             96);
   EXPECT_REGRADE_ERROR(FitWithinMemory(asked, {.max_memory_gb = 0.01}), ExitCode::kResources,
                        "of memory");
-}
-
-// 100^3 cells of level 0; later 25 times the square of the resolution, up to the limit. 1.2
-// vertices a cell with what a uniform field's voxels take but a pruned copy's weights; 45 B a
-// cell twice and two threads' statistics of 24 B.
-TEST(Plan, MemoryOfAnAdaptiveFieldByHand) {
-  FitOptions fit = Fit({100}, {10});
-  fit.field = "auto";
-  const double per_cell = 1.2 * (4 * 128 + 4 * 4) + 2 * 45 + 2 * 24;
-  const auto memory = [&](const std::vector<int>& resolutions) {
-    fit.resolutions = resolutions;
-    fit.steps.assign(resolutions.size(), 10);
-    return static_cast<double>(PlanFit(fit, 0, kCube, 2).memory) - kProgramBytes;
-  };
-  EXPECT_NEAR(memory({100}), 1e6 * per_cell, 2);
-  EXPECT_NEAR(memory({100, 400}), 4e6 * per_cell, 2);
-  fit.max_cells = 2;
-  EXPECT_NEAR(memory({100, 400}), 2e6 * per_cell, 2);
-  // To half of the memory: fewer cells, by steps of a tenth.
-  const auto plan_of = [](const FitOptions& options) { return PlanFit(options, 0, kCube, 2); };
-  const uint64_t half = plan_of(fit).memory / 2 + kProgram / 2;
-  FitOptions lowered = fit;
-  fit.resolutions = {50, 400};
-  lowered.resolutions = fit.resolutions;
-  EXPECT_TRUE(LowerToMemory(plan_of, half, &lowered));
-  EXPECT_EQ(lowered.resolutions, fit.resolutions);
-  EXPECT_LE(plan_of(lowered).memory, half);
-  EXPECT_GT(static_cast<double>(plan_of(lowered).memory), 0.85 * static_cast<double>(half));
-  EXPECT_TRUE(LowerToMemory(plan_of, 1, &lowered));  // in vain: CheckFitsMemory then says so
-  EXPECT_EQ(lowered.max_cells, kLeastCells);
-  EXPECT_FALSE(LowerToMemory(plan_of, 1, &lowered));
 }
 
 }  // namespace

@@ -11,7 +11,6 @@
 #include "pipeline/files/deflate.h"
 #include "pipeline/page/field_codec.h"
 #include "pipeline/page/value_codec.h"
-#include "tests/support/cell_field.h"
 #include "tests/support/small_field.h"
 
 namespace regrade {
@@ -30,7 +29,7 @@ StyleLayers SomeLayers(size_t voxels) {
 }
 
 TEST(ResidualCodec, RoundedByHalfAStepAndZeroStaysZero) {
-  const RadianceField field = testing::RandomCellField({2, 3, 2}, 3, 9, 5);
+  const RadianceField field = testing::RandomField({16, 24, 16}, 9, 0.5, 5);
   const PageField page = EncodeField(field, 0.03);
   const PageVoxels places = RecordsInPageOrder(page, *field.geometry);
   const size_t n = places.voxel.size();
@@ -58,7 +57,7 @@ TEST(ResidualCodec, RoundedByHalfAStepAndZeroStaysZero) {
 }
 
 TEST(ResidualCodec, NothingAddedCostsAlmostNothing) {
-  const RadianceField field = testing::RandomCellField({4, 4, 4}, 3, 1, 5);
+  const RadianceField field = testing::RandomField({32, 32, 32}, 1, 0.5, 5);
   const PageField page = EncodeField(field, 0.03);
   const PageVoxels places = RecordsInPageOrder(page, *field.geometry);
   const size_t n = places.voxel.size();
@@ -93,12 +92,17 @@ TEST(ResidualCodec, WhatIsNotOfTheObjectStays) {
     EXPECT_EQ(styled.appearance.sphere_color[i], source.appearance.sphere_color[i]);
 }
 
-// A density that is rounded to nothing keeps its cell, its voxels and their numbers.
+// A density that is rounded to nothing keeps its voxel and its number.
 TEST(ResidualCodec, VoxelsOfRoundedDensitiesKeepTheirNumbers) {
-  RadianceField field = testing::RandomCellField({2, 2, 2}, 3, 4, 9);
+  RadianceField field = testing::RandomField({16, 16, 16}, 4, 0.7, 9);
   auto geometry = std::make_shared<Geometry>(*field.geometry);
-  for (int64_t v = 0; v < geometry->density.size(); ++v)
-    geometry->density[v] = PlaceOf(geometry->cells.vertex_key[v]).x < 8 ? 1e-9f : 1.0f;
+  std::vector<int64_t> place(static_cast<size_t>(geometry->density.size()));  // of each voxel
+  for (int64_t at = 0; at < geometry->links.size(); ++at) {
+    const int32_t voxel = geometry->links[at];
+    if (voxel < 0) continue;
+    place[static_cast<size_t>(voxel)] = at;
+    geometry->density[voxel] = at < geometry->frame.Vertex(8, 0, 0) ? 1e-9f : 1.0f;
+  }
   field.geometry = geometry;
   const PageField page = EncodeField(field, 0.03);
   const RadianceField decoded = DecodeField(page);
@@ -106,11 +110,10 @@ TEST(ResidualCodec, VoxelsOfRoundedDensitiesKeepTheirNumbers) {
   const PageVoxels after = RecordsInPageOrder(page, *decoded.geometry);
   ASSERT_EQ(std::ssize(after.voxel), page.header.At("voxels").AsInt());
   ASSERT_EQ(before.voxel.size(), after.voxel.size());
-  for (size_t i = 0; i < after.voxel.size(); ++i) {
-    const Vec3i a = PlaceOf(field.geometry->cells.vertex_key[before.voxel[i]]);
-    const Vec3i b = PlaceOf(decoded.geometry->cells.vertex_key[after.voxel[i]]);
-    EXPECT_TRUE(a.x == b.x && a.y == b.y && a.z == b.z) << i;
-  }
+  for (size_t i = 0; i < after.voxel.size(); ++i)
+    EXPECT_EQ(decoded.geometry->links[place[static_cast<size_t>(before.voxel[i])]],
+              after.voxel[i])
+        << i;
 }
 
 }  // namespace

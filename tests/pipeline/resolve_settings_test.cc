@@ -60,7 +60,8 @@ TEST(ResolveSettings, PresetsGiveTheirValues) {
     ResolveSettings({}, &options);
     EXPECT_EQ(DumpJson(options.Values()), DumpJson(bound.Values())) << preset;
   }
-  EXPECT_LT(Resolve({"--preset", "smoke"}).settings.fit.max_cells, 1);
+  EXPECT_LT(Resolve({"--preset", "smoke"}).settings.fit.resolutions.back(),
+            FitOptions().resolutions.back());
   EXPECT_REGRADE_ERROR(Resolve({"--preset", "fast"}), ExitCode::kUsage, "draft");
   EXPECT_EQ(Resolve({}, {.preset = "draft"}).settings.scene.photo_size, 480);
   EXPECT_EQ(Resolve({"--preset=standard"}, {.preset = "draft"}).settings.scene.photo_size, 800);
@@ -116,23 +117,13 @@ TEST(ResolveSettings, LaterSourcesOverrideEarlierOnes) {
   EXPECT_EQ(r.settings.network.rays_per_step, TrainNetworkOptions().rays_per_step);
   EXPECT_EQ(r.settings.render.fps, 12);
 
-  // A field of another kind brings its rates and regularisers, and nothing over a flag.
-  FitOptions uniform;
-  uniform.MakeUniform();
-  r = Resolve({"--field", "voxels", "--fit-field", "uniform", "--config", R"({"tv-sh": 0.5})"});
-  EXPECT_EQ(r.settings.fit.rate_density, uniform.rate_density);
+  // Constants stand over presets.
+  r = Resolve({"--field", "voxels", "--config", R"({"tv-sh": 0.5})"});
   EXPECT_EQ(r.settings.fit.tv_sh, 0.5f);
   EXPECT_EQ(r.settings.fit.resolutions, FitOptions().resolutions);
-  EXPECT_FALSE(Resolve({"--preset", "best"}).settings.fit.prune_last);
-  EXPECT_TRUE(Resolve({"--preset", "draft"}).settings.fit.prune_last);
-  r = Resolve({"--preset", "best", "--field", "voxels", "--fit-field", "uniform"});
-  EXPECT_TRUE(r.settings.fit.prune_last);  // a uniform field is what it was
-  r = Resolve({"--preset", "paper", "--fit-field", "uniform"});
-  EXPECT_EQ(r.settings.fit.rate_density, 30.0f);  // its own: the field is uniform there, too
-  r = Resolve({"--preset", "paper", "--fit-field", "adaptive"});
-  EXPECT_EQ(r.settings.fit.rate_density, std::nullopt);
-  r = Resolve({"--field", "voxels", "--config", R"({"tv-density": 0.05})"});
+  r = Resolve({"--preset", "paper", "--config", R"({"tv-density": 0.05})"});
   EXPECT_EQ(r.settings.fit.tv_density, 0.05f);
+  EXPECT_EQ(r.settings.fit.rate_density, 30.0f);
 
   r = Resolve({"--preset", "best", "--photo-size", "320", "--recipe", "paper"}, sources);
   EXPECT_EQ(r.settings.scene.photo_size, 320);
@@ -162,6 +153,33 @@ TEST(ResolveSettings, FlagsOfTheOtherKindOfFieldAreRefused) {
   const std::string run = folder / "run.json";
   WriteText(run, R"({"arguments": ["/photos"], "options": {"preset": "draft"}})");
   EXPECT_EQ(Resolve({}, {.run_json = run}).settings.scene.field, "voxels");
+}
+
+// A run.json of an earlier version names options that only its fits had; a user's --config may
+// not.
+TEST(ResolveSettings, OptionsOfEarlierVersionsAreDropped) {
+  const TemporaryFolder folder;
+  const std::string run = folder / "run.json";
+  const std::string earlier =
+      R"("fit-field": "adaptive", "fit-fewer-stages": true, "fit-cell-pixels": 1, )"
+      R"("fit-max-cells": 5, "fit-max-forward-cells": 12, "fit-outward": 2, )"
+      R"("fit-free-space": "auto", "fit-rate-density": "auto", "fit-rate-density-end": "auto", )"
+      R"("tv-density": "auto", "tv-sh": "auto", "tv-decay": 0.7, "fit-rate-sh": 0.05, )"
+      R"("fit-resolutions": [48, 96, 192, 384], "background-lead": 0.25)";
+  WriteText(run, R"({"arguments": ["/photos"], "options": {"preset": "draft", "fps": 12, )" +
+                     earlier + "}}");
+  for (const RunSettings& settings :
+       {Resolve({}, {.run_json = run}).settings, Resolve({"--config", run}).settings}) {
+    EXPECT_EQ(settings.render.fps, 12);
+    EXPECT_EQ(settings.fit.rate_density, FitOptions().rate_density);
+    EXPECT_EQ(settings.fit.tv_sh, FitOptions().tv_sh);
+    EXPECT_EQ(settings.fit.tv_decay, FitOptions().tv_decay);
+    EXPECT_EQ(settings.fit.rate_sh, FitOptions().rate_sh);
+    EXPECT_LT(settings.fit.resolutions.back(), 384);
+  }
+  for (const char* config : {R"({"fit-field": "adaptive"})", R"({"tv-density": "auto"})"})
+    EXPECT_REGRADE_ERROR(Resolve({"--field", "voxels", "--config", config}), ExitCode::kUsage,
+                         config[2] == 'f' ? "fit-field" : "tv-density");
 }
 
 // Constants come from --config alone: over presets and recipes, whichever comes first.

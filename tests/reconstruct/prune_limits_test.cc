@@ -44,7 +44,6 @@ class PruneBy : public ::testing::Test {
     camera_.fx = camera_.fy = 48;
     camera_.cx = camera_.cy = 12;
     camera_.camera_from_world.translation = {0, 0, 3};
-    options_.MakeUniform();
     options_.resolutions = {12};
     options_.steps = {1};
     options_.rays_per_step = 16;

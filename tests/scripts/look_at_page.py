@@ -232,9 +232,9 @@ def check_folder(browser, arguments):
             here += complaints(page)
             found += [f"{name}, {size_name}: {complaint}" for complaint in here]
             page.close()
-        if number == 0 or name in ("uniform", "spheres", "spheres_object", "splats"):
+        if number == 0 or name in ("near_object", "spheres", "splats"):
             found += [f"{name}, opening: {c}" for c in check_coarse_first(browser, path) + check_without_workers(browser, path, views, number == 0)]
-        if number == 0 or name in ("uniform_near", "levels_residual", "splats"):
+        if number == 0 or name in ("near_object", "grid_residual", "splats"):
             found += [f"{name}, {c}" for c in check_graphics(browser, path, views)]
     return found
 

@@ -5,6 +5,7 @@
 #include "kernels/base/half.h"
 #include "tests/support/record_error.h"
 #include "tests/support/row_of_voxels.h"
+#include "tests/support/small_field.h"
 #include "tests/support/steepest_pair.h"
 #include "tests/support/styled_ball.h"
 
@@ -190,6 +191,21 @@ TEST(LipschitzNetwork, RefusesWhatIsNoNetwork) {
     if (defect == 5) bad.basis = 16;  // and the weights are those of nine
     EXPECT_THROW(LipschitzNetwork{bad}, Error) << defect;
   }
+}
+
+// --- features
+
+TEST(FillFeatures, PositionsOfVoxelsAreTheirPlacesInTheBox) {
+  const RadianceField field = RandomField({5, 4, 6}, 4, 1.0, 1);
+  const GridFrame& frame = field.geometry->frame;
+  float row[kFeatureStride];
+  FillFeatures(field, 0.5f, 7, frame.Vertex(3, 1, 4), row);
+  const Vec3f world = frame.WorldOf({3, 1, 4});
+  for (int a = 0; a < 3; ++a) {
+    const double expected = (double{world[a]} - frame.center[a]) / double{frame.radius[a]};
+    EXPECT_NEAR(row[kNetworkSh + a], 0.5 * expected, 1e-6);  // float's rounding of `world`
+  }
+  EXPECT_EQ(row[9], field.appearance.sh[7 * 12 + 4]);  // padded to nine harmonics
 }
 
 // --- the regularisation

@@ -7,7 +7,7 @@
 #include "kernels/field/render_ray.h"
 #include "stylize/field/blend_fields.h"
 #include "stylize/field/volume_variance.h"
-#include "tests/support/cell_field.h"
+#include "tests/support/small_field.h"
 #include "tests/support/styled_ball.h"
 
 namespace regrade {

@@ -11,6 +11,7 @@
 #include "tests/support/algorithm1.h"
 #include "tests/support/expect_error.h"
 #include "tests/support/record_error.h"
+#include "tests/support/row_of_voxels.h"
 #include "tests/support/splat_ball.h"
 
 namespace regrade {
@@ -351,6 +352,22 @@ TEST_P(SplatStyleOf, PairsStayBelowTheirBound) {
   EXPECT_LE(report.largest_fraction, 1 + 1e-4);
   const Threads single(1);
   EXPECT_EQ(PixelsOfOnePoint(source, cameras, 2000, 3, {}).size(), points.size());
+}
+
+// --- positions
+
+// Positions of splats: as voxels' within the box, EQ(splat-position) outside of it.
+TEST(FillFeatures, SplatsFarOutsideStayInReach) {
+  Splats splats(3, 1);
+  const Vec3f means[] = {{2, 1, -3}, {5, 1, -1}, {1e20f, 0, 1}};
+  for (int i = 0; i < 3; ++i) splats.Set(i, {.mean = means[i]});
+  const RadianceField field = FieldOfSplats(splats, {{}, {1, 1, -1}, {2, 1, 4}}, 0, -1);
+  const Vec3f expected[] = {{0.5f, 0, -0.5f}, {1.5f, 0, 0}, {2, 0, 0}};
+  for (int i = 0; i < 3; ++i) {
+    float row[kFeatureStride];
+    FillFeatures(field, 3, i, i, row);
+    for (int a = 0; a < 3; ++a) EXPECT_NEAR(row[27 + a], 3 * expected[i][a], 1e-5) << i;
+  }
 }
 
 }  // namespace

@@ -84,32 +84,6 @@ TEST(VoxelResidual, AGridsNeighboursAreTheNextVoxels) {
   EXPECT_EQ(*std::max_element(graph.cubes[1].begin(), graph.cubes[1].end()), 0);
 }
 
-TEST(VoxelResidual, AnAdaptiveFieldsNeighboursAreTheEndsOfItsCellsEdges) {
-  // Two cells beside each other, and one of them split: the coarse cell's four edges beside the
-  // fine ones stay, and the corners in the middle of its face are tied by the fine cells alone.
-  auto geometry = std::make_shared<Geometry>();
-  geometry->frame.resolution = {4, 2, 2};
-  CellGrid& cells = geometry->cells;
-  cells.finest = 1;
-  std::vector<std::pair<CellKey, uint8_t>> leaves{{KeyOf({2, 0, 0}), uint8_t{0}}};
-  for (int k = 0; k < 8; ++k)
-    leaves.emplace_back(KeyOf({k >> 2, k >> 1 & 1, k & 1}), uint8_t{1});
-  std::sort(leaves.begin(), leaves.end());
-  cells.key.Resize(9), cells.level.Resize(9);
-  for (int c = 0; c < 9; ++c) cells.key[c] = leaves[c].first, cells.level[c] = leaves[c].second;
-  FindVertices(&cells);
-  BuildTree(geometry->frame.resolution, &cells);
-  geometry->density.Resize(cells.num_vertices());
-  RadianceField field;
-  field.appearance.basis = 1;
-  field.appearance.sh.Resize(3 * cells.num_vertices());
-  field.geometry = std::move(geometry);
-  const VoxelGraph graph = GraphOf(field);
-  // 27 corners of the fine cells with 3 * 9 * 2 edges; 4 more of the coarse cell with its 12.
-  EXPECT_EQ(graph.voxels, 27 + 4);
-  EXPECT_EQ(std::ssize(graph.edges), 54 + 12);
-}
-
 TEST(VoxelResidual, GradientIsTheEnergysDerivativeInDouble) {
   const VoxelGraph graph = GraphOf(Block(4, 2));
   const ResidualRays rays = SomeRays(graph, 40, graph.voxels, 3);

@@ -58,7 +58,6 @@ class FitField : public ::testing::Test {
       photos_.push_back(RenderViewPlain(truth, camera, {0.5f, 1e-4f}).color);
     }
     for (size_t i = 1; i < cameras_.size(); ++i) views_.push_back({cameras_[i], &photos_[i]});
-    options_.MakeUniform();
     options_.resolutions = {12, 24};
     options_.steps = {60, 60};
     options_.rays_per_step = 1024;
@@ -101,7 +100,7 @@ class FitField : public ::testing::Test {
     return Fit(hooks);
   }
 
-  // Voxels or cells, densities and colours, also of background spheres.
+  // Links, densities and colours, also of background spheres.
   static bool SameBits(const RadianceField& a, const RadianceField& b) {
     const auto same = [](const auto& x, const auto& y) {
       return x.size() == y.size() &&
@@ -109,7 +108,6 @@ class FitField : public ::testing::Test {
                                            sizeof(x[0]) * static_cast<size_t>(x.size())) == 0);
     };
     return same(a.geometry->links, b.geometry->links) &&
-           same(a.geometry->cells.key, b.geometry->cells.key) &&
            same(a.geometry->density, b.geometry->density) &&
            same(a.appearance.sh, b.appearance.sh) &&
            same(a.geometry->spheres.density, b.geometry->spheres.density) &&

@@ -20,17 +20,15 @@ struct DoubleField {
         sphere_color(field.appearance.sphere_color.begin(),
                      field.appearance.sphere_color.end()) {}
   FieldView<double> view() const {
-    return {
-        geometry.frame,
-        geometry.links.data(),
-        density.data(),
-        sh.data(),
-        basis,
-        background,
-        0.0,
-        {geometry.spheres.layers, geometry.spheres.resolution, geometry.spheres.links.data(),
-         sphere_density.data(), sphere_color.data()},
-        geometry.cells.on() ? ViewOf(geometry.cells, geometry.frame.resolution) : CellsView{}};
+    return {geometry.frame,
+            geometry.links.data(),
+            density.data(),
+            sh.data(),
+            basis,
+            background,
+            0.0,
+            {geometry.spheres.layers, geometry.spheres.resolution,
+             geometry.spheres.links.data(), sphere_density.data(), sphere_color.data()}};
   }
   const Geometry& geometry;
   std::vector<double> density, sh;

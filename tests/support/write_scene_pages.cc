@@ -29,8 +29,8 @@
 #include "stylize/field/blend_fields.h"
 #include "stylize/image/monge_kantorovich.h"
 #include "stylize/training/initial_network.h"
-#include "tests/support/cell_field.h"
 #include "tests/support/keyframes.h"
+#include "tests/support/small_field.h"
 #include "tests/support/small_splats.h"
 
 namespace regrade {
@@ -246,6 +246,21 @@ void WritePath(const std::string& folder) {
   WriteJsonFile(folder + "/places.json", JsonValue(std::move(table)));
 }
 
+// A grid with empty bricks between full ones, which rays skip.
+RadianceField GridWithAHole() {
+  const RadianceField full = testing::RandomField({40, 10, 8}, 9, 0.4, 5);
+  auto geometry = std::make_shared<Geometry>();
+  geometry->frame = full.geometry->frame;
+  geometry->links.Resize(full.geometry->links.size());
+  const int64_t slab = full.geometry->frame.Vertex(1, 0, 0);
+  int32_t count = 0;
+  for (int64_t at = 0; at < geometry->links.size(); ++at) {
+    const bool empty = at >= 8 * slab && at < 32 * slab;
+    geometry->links[at] = !empty && full.geometry->links[at] >= 0 ? count++ : -1;
+  }
+  return testing::RandomValues(std::move(geometry), count, 9, 5);
+}
+
 }  // namespace
 }  // namespace regrade
 
@@ -261,18 +276,15 @@ int main(int argc, char** argv) {
     WritePageOfRun(folder, argv[2], argv[3]);
     return 0;
   }
-  WritePages(folder, "levels", testing::RandomCellField({2, 3, 2}, 3, 9, 5), false);
-  WritePages(folder, "levels_near", testing::RandomCellField({2, 2, 2}, 2, 4, 6), true);
-  RadianceField uniform = testing::RandomField({13, 17, 9}, 1, 0.5, 6);
-  uniform.near_clip = 0.2f;
-  WritePages(folder, "uniform", uniform, false);
-  WritePages(folder, "uniform_near", testing::RandomField({12, 11, 10}, 9, 0.7, 8), true);
+  const RadianceField grid = GridWithAHole();
+  WritePages(folder, "grid", grid, false);
+  WritePages(folder, "grid_residual", grid, false, Layers::kResidual);
+  RadianceField near = testing::RandomField({13, 17, 9}, 1, 0.5, 6);
+  near.near_clip = 0.2f;
+  WritePages(folder, "near_object", near, true, Layers::kObject);
   RadianceField far = testing::RandomField({9, 8, 11}, 9, 0.3, 7);
   testing::AddSpheres(5, 12, 0.7, 8, &far);
   WritePages(folder, "spheres", far, false);
-  WritePages(folder, "levels_residual", testing::RandomCellField({2, 3, 2}, 3, 9, 5), false,
-             Layers::kResidual);
-  WritePages(folder, "spheres_object", far, false, Layers::kObject);
   WritePages(folder, "splats", SplatsField(), false, Layers::kResidual);
   WritePath(folder);
   WriteColorMaps(folder);

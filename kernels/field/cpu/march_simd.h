@@ -1,5 +1,4 @@
 // Marches the density along a ray, many steps at once; compiled once per instruction set.
-// cell_march_simd.h marches an adaptive field.
 //
 // Between skips through empty space a ray is marched in blocks of kWide steps: positions,
 // corner weights, density and opacity are vectors over the steps, and only the transmittance
@@ -21,9 +20,9 @@ namespace {
 // Consecutive steps, one per lane.
 struct alignas(64) StepBlock {
   float corner_weight[8][kWide];
-  int32_t vertex[kWide];  // lowest corner of the cell; of an adaptive field the cell
+  int32_t vertex[kWide];  // lowest corner of the cell
   int32_t composited[kWide];
-  float t[kWide];  // voxels; of an adaptive field world units
+  float t[kWide];  // voxels
   float alpha[kWide];
   float decay[kWide];  // exp(-tau)
   float slope[kWide];  // dtau/dsigma, world units; 0 if sigma or tau is clamped
@@ -42,8 +41,8 @@ struct Marched {
   std::vector<StepBlock> blocks;
   std::vector<Sample> samples;  // capacity; the first num_samples are this ray's
   int64_t num_samples = 0;
-  int32_t num_blocks = 0;     // with samples
-  float world_per_voxel = 0;  // or the unit of t
+  int32_t num_blocks = 0;  // with samples
+  float world_per_voxel = 0;
   float transmittance = 1;
 
   const StepBlock& block(const Sample& sample) const {

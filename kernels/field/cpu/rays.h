@@ -8,7 +8,6 @@
 #include "kernels/base/buffer.h"
 #include "kernels/field/cpu/spheres.h"
 #include "kernels/field/density_losses.h"
-#include "kernels/field/free_space.h"
 #include "kernels/field/packed_grid.h"
 #include "kernels/field/ray_march.h"
 #include "kernels/optimize/rmsprop.h"
@@ -56,15 +55,12 @@ struct FastRayFunctions {
   FitStepResult (*accumulate)(const FastGrid&, const RayBatch&, const MarchOptions&,
                               float scale, GradientArena*);
   // Largest w_i that any ray gives a sample at each voxel's corners; weights [N] are running
-  // maxima. Of an adaptive field: a sample in each cell, weights [C].
+  // maxima.
   void (*max_weights)(const FastGrid&, const Ray*, int64_t n, const MarchOptions&,
                       float* weights);
-  // Adds the gradient of the total variation of vertices [begin, end), or of an adaptive
-  // field's cells: see total_variation.h and cell_variation.h.
+  // Adds the gradient of the total variation of vertices [begin, end), see total_variation.h.
   void (*total_variation)(const FastGrid&, int64_t begin, int64_t end, float scale_density,
                           float scale_sh, GradientArena*);
-  // Adds the gradient of scale times the sum of the opacities of EQ(free-space).
-  void (*free_space)(const FastGrid&, const FreeRay*, int64_t n, float scale, GradientArena*);
   // Steps slots [begin, end) of arena `self` by the sum over all arenas in order; a voxel
   // belongs to the first arena that has it.
   int64_t (*step)(FastGrid*, float* second_moment, const GradientArena* arenas, int num_arenas,

@@ -4,8 +4,6 @@
 #include <algorithm>
 #include <type_traits>
 
-#include "kernels/field/cpu/cell_march_simd.h"
-#include "kernels/field/cpu/free_space_simd.h"
 #include "kernels/field/cpu/march_simd.h"
 #include "kernels/field/cpu/rays.h"
 #include "kernels/field/cpu/scatter_simd.h"
@@ -16,11 +14,10 @@
 namespace regrade::REGRADE_SIMD_NAMESPACE {
 namespace {
 
-// Calls done(index, &marched) for each ray, in an order that depends on the rays alone.
+// Calls done(index, &marched) for each ray in order.
 template <typename Done>
 void MarchRays(const FastGrid& grid, const Ray* rays, int64_t n, const MarchOptions& options,
                const Done& done) {
-  if (grid.cells().on()) return MarchCellRays(grid, rays, n, options, done);
   Marched marched;
   for (int64_t r = 0; r < n; ++r) {
     March(grid, rays[r], options, &marched);
@@ -112,11 +109,6 @@ void MaxWeights(const FastGrid& grid, const Ray* rays, int64_t n, const MarchOpt
     for (int64_t i = 0; i < marched->num_samples; ++i) {
       const Sample& s = marched->samples[static_cast<size_t>(i)];
       const float w = marched->weight(s);
-      if (grid.cells().on()) {
-        float& most = weights[marched->block(s).vertex[s.lane]];
-        most = std::max(most, w);
-        continue;
-      }
       int32_t link[8];
       LoadLinks(grid, offsets, marched->block(s).vertex[s.lane], link);
       for (int k = 0; k < 8; ++k)
@@ -170,18 +162,11 @@ const FastRayFunctions kFunctions = {
     MaxWeights,
     [](const FastGrid& g, int64_t begin, int64_t end, float density, float sh,
        GradientArena* arena) {
-      const auto add = [&](auto basis) {
-        if (g.cells().on())
-          CellVariation<basis.value>(g, begin, end, density, sh, arena);
-        else
-          TotalVariation<basis.value>(g, begin, end, density, sh, arena);
-      };
       ByBasis(
-          g.basis, [&] { add(std::integral_constant<int, 9>()); },
-          [&] { add(std::integral_constant<int, 4>()); },
-          [&] { add(std::integral_constant<int, 1>()); });
+          g.basis, [&] { TotalVariation<9>(g, begin, end, density, sh, arena); },
+          [&] { TotalVariation<4>(g, begin, end, density, sh, arena); },
+          [&] { TotalVariation<1>(g, begin, end, density, sh, arena); });
     },
-    FreeSpace,
     [](FastGrid* g, float* moments, const GradientArena* arenas, int count, int self,
        int64_t begin, int64_t end, const RmspropOptions& o) {
       return ByBasis(

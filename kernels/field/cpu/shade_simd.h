@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cstdint>
-#include <cstring>
 
 #include "kernels/field/cpu/march_simd.h"
 #include "kernels/field/cpu/record_simd.h"
@@ -29,13 +28,9 @@ struct RayBasis {
   }
 };
 
-// `vertex`: see StepBlock.
+// Of the corners of the cell whose lowest one is `vertex`.
 inline void LoadLinks(const FastGrid& grid, const CornerOffsets& offsets, int32_t vertex,
                       int32_t* link) {
-  if (grid.cells().on()) {
-    std::memcpy(link, grid.cells().corner.data() + 8 * int64_t{vertex}, 8 * sizeof(int32_t));
-    return;
-  }
   const Probe* lowest = grid.probes.data() + vertex;
   for (int row = 0; row < 4; ++row)
     for (int z = 0; z < 2; ++z) link[2 * row + z] = lowest[offsets[row] + z].link;
@@ -85,13 +80,8 @@ inline Quad Shade(const FastGrid& grid, const RayBasis<kBasis>& basis, Marched* 
   Sample* const samples = marched->samples.data();
   const float* const records = grid.records.data();
   Quad color{};
-  const int32_t* const corners = grid.cells().on() ? grid.cells().corner.data() : nullptr;
-  for (int64_t i = -2 * kAhead; i < n; ++i) {
-    if (corners != nullptr && i + 2 * kAhead < n) {
-      const Sample& ahead = samples[i + 2 * kAhead];
-      __builtin_prefetch(corners + 8 * int64_t{marched->block(ahead).vertex[ahead.lane]});
-    }
-    if (i >= -kAhead && i + kAhead < n) {
+  for (int64_t i = -kAhead; i < n; ++i) {
+    if (i + kAhead < n) {
       Sample& ahead = samples[i + kAhead];
       const int32_t vertex = marched->block(ahead).vertex[ahead.lane];
       LoadLinks(grid, offsets, vertex, ahead.corner);

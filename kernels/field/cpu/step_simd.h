@@ -2,10 +2,8 @@
 // set.
 #pragma once
 
-#include <algorithm>
 #include <cmath>
 
-#include "kernels/field/cell_variation.h"
 #include "kernels/field/cpu/record_simd.h"
 #include "kernels/field/spherical_harmonics.h"
 
@@ -81,52 +79,6 @@ void TotalVariation(const FastGrid& grid, int64_t begin, int64_t end, float scal
   }
 }
 
-// See EQ(cell-variation): of the cells [begin, end).
-template <int kBasis>
-void CellVariation(const FastGrid& grid, int64_t begin, int64_t end, float scale_density,
-                   float scale_sh, GradientArena* arena) {
-  using R = Record<kBasis>;
-  using Shape = RecordShape<kBasis>;
-  using Vector = typename Shape::Vector;
-  constexpr int kLanes = Shape::kLanes;
-  const CellGrid& cells = grid.cells();
-  R unit[kMaxCellLevel + 1], scale[kMaxCellLevel + 1];
-  for (int level = 0; level <= cells.finest; ++level) {
-    alignas(64) float units[kLanes], scales[kLanes] = {};
-    std::fill_n(units, kLanes, 1.0f);
-    units[DensityLane(kBasis)] = WorldWidth(grid.frame, 1 << (cells.finest - level));
-    for (int l = 0; l < 3 * kBasis; ++l) scales[l] = scale_sh / 4;
-    scales[DensityLane(kBasis)] = scale_density * units[DensityLane(kBasis)] / 4;
-    unit[level] = R::Load(units);
-    scale[level] = R::Load(scales);
-  }
-  ReserveSlots(arena, 8 * (end - begin), kLanes);
-  for (int64_t c = begin; c < end; ++c) {
-    const int32_t* const corner = cells.corner.data() + 8 * c;
-    const int level = cells.level[c];
-    R d[3] = {R::Zero(), R::Zero(), R::Zero()};
-    for (int k = 0; k < 8; ++k) {
-      const R v = R::Load(grid.records.data() + int64_t{corner[k]} * kLanes);
-      for (int a = 0; a < 3; ++a)
-        for (int i = 0; i < Shape::kCount; ++i)
-          d[a].v[i] += (k >> (2 - a) & 1 ? 0.25f : -0.25f) * unit[level].v[i] * v.v[i];
-    }
-    for (int i = 0; i < Shape::kCount; ++i) {
-      const Vector sum =
-          d[0].v[i] * d[0].v[i] + d[1].v[i] * d[1].v[i] + d[2].v[i] * d[2].v[i] + 1e-9f;
-      const Vector inverse = scale[level].v[i] / SquareRoot(sum);
-      for (auto& along : d) along.v[i] *= inverse;
-    }
-    for (int k = 0; k < 8; ++k) {
-      R g;
-      for (int i = 0; i < Shape::kCount; ++i)
-        g.v[i] = (k & 4 ? d[0].v[i] : -d[0].v[i]) + (k & 2 ? d[1].v[i] : -d[1].v[i]) +
-                 (k & 1 ? d[2].v[i] : -d[2].v[i]);
-      AddToSlot(g, SlotOf(arena, corner[k], kLanes), arena);
-    }
-  }
-}
-
 template <int kBasis>
 int64_t Step(FastGrid* grid, float* second_moment, const GradientArena* arenas, int num_arenas,
              int self, int64_t begin, int64_t end, const RmspropOptions& options) {
@@ -137,10 +89,7 @@ int64_t Step(FastGrid* grid, float* second_moment, const GradientArena* arenas, 
   alignas(64) float rate_lanes[kLanes] = {};
   for (int l = 0; l < 3 * kBasis; ++l) rate_lanes[l] = options.rate_sh;
   rate_lanes[DensityLane(kBasis)] = options.rate_density;
-  const R same_rate = R::Load(rate_lanes);
-  alignas(64) float density_lanes[kLanes] = {};
-  density_lanes[DensityLane(kBasis)] = 1;
-  const R only_density = R::Load(density_lanes);
+  const R rate = R::Load(rate_lanes);
   alignas(64) float low_lanes[kLanes], high_lanes[kLanes];
   static_assert(RmspropOptions().mean_bound == static_cast<float>(0.5 / kSh0));
   for (int l = 0; l < kLanes; ++l) {
@@ -151,16 +100,14 @@ int64_t Step(FastGrid* grid, float* second_moment, const GradientArena* arenas, 
     high_lanes[l] = bound;
   }
   const R low = R::Load(low_lanes), high = R::Load(high_lanes);
-  const bool adaptive = grid->cells().on();
   // The copy of a voxel's density that marches read.
   const auto density_of = [&](int32_t voxel) {
-    return adaptive ? &grid->vertex_density[voxel]
-                    : &grid->probes[grid->vertex_of_voxel[voxel]].density;
+    return &grid->probes[grid->vertex_of_voxel[voxel]].density;
   };
   int64_t rejected = 0;
   constexpr int64_t kAhead = 8;  // slots are in ray order, so voxels are scattered in memory
   for (int64_t slot = begin; slot < end; ++slot) {
-    if (!adaptive && slot + 2 * kAhead < end)
+    if (slot + 2 * kAhead < end)
       __builtin_prefetch(&grid->vertex_of_voxel[arenas[self].voxel_of_slot[slot + 2 * kAhead]]);
     if (slot + kAhead < end) {
       const int32_t ahead = arenas[self].voxel_of_slot[slot + kAhead];
@@ -191,10 +138,7 @@ int64_t Step(FastGrid* grid, float* second_moment, const GradientArena* arenas, 
     float* values = grid->records.data() + static_cast<int64_t>(voxel) * kLanes;
     float* moments = second_moment + static_cast<int64_t>(voxel) * kLanes;
     const R v = R::Load(moments), x = R::Load(values);
-    R new_v, new_x, rate = same_rate;
-    if (grid->density_rate.size() > 0)
-      for (int i = 0; i < Shape::kCount; ++i)
-        rate.v[i] *= 1.0f + only_density.v[i] * (grid->density_rate[voxel] - 1.0f);
+    R new_v, new_x;
     for (int i = 0; i < Shape::kCount; ++i) {
       const Vector squared = g.v[i] * g.v[i];
       const Vector blended = options.beta * v.v[i] + (1 - options.beta) * squared;

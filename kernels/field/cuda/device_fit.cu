@@ -4,7 +4,6 @@
 #include <vector>
 
 #include "kernels/base/error.h"
-#include "kernels/field/cuda/cell_march.h"
 #include "kernels/field/cuda/device_sphere_rays.h"
 #include "kernels/field/cuda/gradient_view.h"
 #include "kernels/field/cuda/launch.h"
@@ -39,18 +38,14 @@ constexpr int kWarpsPerBlock = 4;
 
 // A ray's composited samples, front to back, stored for the adjoint: [capacity] of each.
 struct SampleStore {
-  float4* place;                 // vertex (as bits), fraction
-  float4* raw_tau;               // colour before the clamp, optical depth
-  float* before;                 // transmittance before
-  const float4* rest = nullptr;  // of an adaptive field instead; see CellSamples
-
-  __device__ float Before(int i) const { return rest != nullptr ? rest[i].x : before[i]; }
-  __device__ float Delta(int i, float same) const { return rest != nullptr ? rest[i].y : same; }
+  float4* place;    // vertex (as bits), fraction
+  float4* raw_tau;  // colour before the clamp, optical depth
+  float* before;    // transmittance before
 };
 
 // Adds the gradients of `count` samples, the i-th of them held by lane i, to the corners'
 // records: d / d value = sum_c of[c] d_raw[c] + density d_sigma.
-template <int kBasis, bool kExact, typename Sampler>
+template <int kBasis, bool kExact>
 __device__ void ScatterChunk(const DeviceGridView& grid, const LaneValues<kBasis>& values,
                              const float4& place, const Vec3f& d_raw, float d_sigma, int count,
                              const GradientView& gradient, int lane) {
@@ -71,7 +66,7 @@ __device__ void ScatterChunk(const DeviceGridView& grid, const LaneValues<kBasis
     for (int i = 0; i < Layout::kValues; ++i)
       own[i] = values.of[0][i] * d.x + values.of[1][i] * d.y + values.of[2][i] * d.z +
                values.density[i] * d_density;
-    const GroupLinks<Layout::kGroup> links(Sampler(grid), vertex, valid, lane);
+    const GroupLinks<Layout::kGroup> links(GridSampler(grid), vertex, valid, lane);
     links.ForEachOwn([&](int32_t link) { Touch(gradient.touched, link); });
 #pragma unroll
     for (int k = 0; k < 8; ++k) {
@@ -92,7 +87,7 @@ __device__ void ScatterChunk(const DeviceGridView& grid, const LaneValues<kBasis
 
 // The backward pass along a ray; see EQ(composite-adjoint). `behind` is the radiance behind all
 // samples, `remaining` the transmittance there.
-template <int kBasis, bool kExact, typename Sampler>
+template <int kBasis, bool kExact>
 __device__ void WalkBack(const DeviceGridView& grid, const LaneValues<kBasis>& values,
                          const SampleStore& store, int count, float delta, Vec3f behind,
                          const Vec3f& d_color, const DensityLosses& losses, float remaining,
@@ -107,7 +102,7 @@ __device__ void WalkBack(const DeviceGridView& grid, const LaneValues<kBasis>& v
     if (mine >= 0) {
       place = store.place[mine];
       const float4 raw_tau = store.raw_tau[mine];
-      before = store.Before(mine);
+      before = store.before[mine];
       tau = raw_tau.w;
       a = expf(-tau);
       color = {fmaxf(raw_tau.x, 0.0f), fmaxf(raw_tau.y, 0.0f), fmaxf(raw_tau.z, 0.0f)};
@@ -119,20 +114,19 @@ __device__ void WalkBack(const DeviceGridView& grid, const LaneValues<kBasis>& v
     }
     const Vec3f radiance_behind = BackgroundRadiance(a, b, lane, &behind);
     if (mine >= 0 && tau < static_cast<float>(kMaxOpticalDepth)) {
-      const float length = store.Delta(mine, delta);
-      d_sigma = length * before * a * Dot(color - radiance_behind, d_color);
-      if (losses.on() && length > 0)
-        d_sigma += DensityLossSlope(losses, remaining, tau / length, length);
+      d_sigma = delta * before * a * Dot(color - radiance_behind, d_color);
+      if (losses.on() && delta > 0)
+        d_sigma += DensityLossSlope(losses, remaining, tau / delta, delta);
     }
-    ScatterChunk<kBasis, kExact, Sampler>(grid, values, place, d_raw, d_sigma, min(32, end),
-                                          gradient, lane);
+    ScatterChunk<kBasis, kExact>(grid, values, place, d_raw, d_sigma, min(32, end), gradient,
+                                 lane);
     __syncwarp();
   }
 }
 
 // Shades the samples of a ray that wait in a store from `shaded` on, one per group of lanes.
 // Adds to lanes' sums.
-template <int kBasis, typename Sampler>
+template <int kBasis>
 __device__ void ShadeStored(const DeviceGridView& grid, const LaneValues<kBasis>& values,
                             const SampleStore& store, int shaded, int count, int lane,
                             Vec3f* color) {
@@ -140,10 +134,10 @@ __device__ void ShadeStored(const DeviceGridView& grid, const LaneValues<kBasis>
   const int at = shaded + lane / Layout::kGroup;
   const bool valid = at < count;
   const float4 place = valid ? store.place[at] : float4{};
-  const Vec3f raw = RawColor<kBasis, Sampler>(grid, values, __float_as_int(place.x),
-                                              {place.y, place.z, place.w}, valid, lane);
+  const Vec3f raw =
+      RawColor(grid, values, __float_as_int(place.x), {place.y, place.z, place.w}, valid, lane);
   if (!valid || lane % Layout::kGroup != 0) return;
-  const float tau = store.raw_tau[at].w, w = store.Before(at) * Opacity(tau);
+  const float tau = store.raw_tau[at].w, w = store.before[at] * Opacity(tau);
   store.raw_tau[at] = {raw.x, raw.y, raw.z, tau};
   for (int c = 0; c < 3; ++c) (*color)[c] += w * fmaxf(raw[c], 0.0f);
 }
@@ -163,40 +157,6 @@ struct RayLoss {
       d_behind_rays[ray] = error * (sees_layers ? 2 * scale * transmittance : 0.0f);
   }
 };
-
-// The forward and backward pass of an adaptive field's rays, whose samples are in lists; a warp
-// a ray.
-template <int kBasis, bool kExact>
-__global__ void FitCellRaysKernel(DeviceGridView grid, const Ray* rays, const Vec3f* targets,
-                                  int64_t n, float stop, float scale, DensityLosses losses,
-                                  GradientView gradient, CellSamples lists,
-                                  const Vec3f* behind_rays, Vec3f* d_behind_rays,
-                                  DeviceFitSums* sums) {
-  using Layout = RecordLayout<kBasis>;
-  const int lane = static_cast<int>(threadIdx.x & 31);
-  const int64_t r = (blockIdx.x * static_cast<int64_t>(blockDim.x) + threadIdx.x) / 32;
-  if (r >= n) return;
-  const int64_t begin = r * lists.capacity;
-  const SampleStore store{reinterpret_cast<float4*>(lists.place) + begin,
-                          reinterpret_cast<float4*>(lists.raw_tau) + begin, nullptr,
-                          reinterpret_cast<float4*>(lists.rest) + begin};
-  float basis[kMaxVoxelBasis];
-  ShBasis(kBasis, rays[r].direction, basis);
-  const LaneValues<kBasis> values(lane, basis);
-  const int count = lists.count[r];
-  Vec3f color{};
-  for (int shaded = 0; shaded < count; shaded += Layout::kSamples)
-    ShadeStored<kBasis, CellSampler>(grid, values, store, shaded, count, lane, &color);
-  const RayLoss loss(grid, color, lists.transmittance[r], targets[r], r, stop, scale,
-                     behind_rays, d_behind_rays, lane);
-  __syncwarp();  // colours were written by some lanes and are read by others
-  WalkBack<kBasis, kExact, CellSampler>(grid, values, store, count, 0, loss.behind,
-                                        loss.error * (2 * scale), losses,
-                                        lists.transmittance[r], gradient, lane);
-  if (lane != 0) return;
-  atomicAdd(&sums->squared_error, ExactTerm(static_cast<double>(Dot(loss.error, loss.error))));
-  atomicAdd(&sums->samples, static_cast<unsigned long long>(count));
-}
 
 template <int kBasis, bool kExact>
 __global__ void FitRaysKernel(DeviceGridView grid, const Ray* rays, const Vec3f* targets, int n,
@@ -227,7 +187,7 @@ __global__ void FitRaysKernel(DeviceGridView grid, const Ray* rays, const Vec3f*
     Vec3f color{};
     int count = 0, shaded = 0;
     const auto shade = [&] {
-      ShadeStored<kBasis, GridSampler>(grid, values, store, shaded, count, lane, &color);
+      ShadeStored(grid, values, store, shaded, count, lane, &color);
       shaded += Layout::kSamples;
     };
     while (march.Next(&sample, &composited)) {
@@ -249,9 +209,8 @@ __global__ void FitRaysKernel(DeviceGridView grid, const Ray* rays, const Vec3f*
     squared_error += ExactTerm(static_cast<double>(Dot(loss.error, loss.error)));
     samples += static_cast<unsigned>(count);
     __syncwarp();  // colours were written by some lanes and are read by others
-    WalkBack<kBasis, kExact, GridSampler>(grid, values, store, count, march.delta(),
-                                          loss.behind, loss.error * (2 * scale), losses,
-                                          transmittance, gradient, lane);
+    WalkBack<kBasis, kExact>(grid, values, store, count, march.delta(), loss.behind,
+                             loss.error * (2 * scale), losses, transmittance, gradient, lane);
   }
   if (lane == 0) {
     atomicAdd(&sums->squared_error, squared_error);
@@ -263,10 +222,7 @@ __global__ void FitRaysKernel(DeviceGridView grid, const Ray* rays, const Vec3f*
 
 DeviceRayFitter::DeviceRayFitter(const GridFrame& frame, const MarchOptions& options,
                                  int64_t max_bytes)
-    : options_(options),
-      max_bytes_(max_bytes),
-      next_ray_(1, "a counter of rays"),
-      sums_(1, "sums of a fit") {
+    : options_(options), next_ray_(1, "a counter of rays"), sums_(1, "sums of a fit") {
   sums_.Zero();
   const Vec3f n = frame.resolution.Cast<float>();
   // The longest path through the box; a multiple of 4 aligns the parts of a store.
@@ -276,25 +232,8 @@ DeviceRayFitter::DeviceRayFitter(const GridFrame& frame, const MarchOptions& opt
   const int64_t wanted = static_cast<int64_t>(ReadDeviceStatus().multiprocessors) * 32;
   const int64_t fitting = std::min(wanted, max_bytes / bytes_a_warp);
   warps_ = static_cast<int>(std::max<int64_t>(fitting / kWarpsPerBlock, 1)) * kWarpsPerBlock;
-}
-
-void DeviceRayFitter::AccumulateCells(const DeviceGrid& grid, const Ray* rays,
-                                      const Vec3f* targets, int64_t n, float scale,
-                                      DeviceTouched* touched, const DensityLosses& losses) {
-  if (cells_.rays() == 0) cells_ = CellSampleStore(grid.frame, n, max_bytes_);
-  const CellSamples lists = cells_.view();
-  const GradientView view{grid.gradient(), touched->bits.data()};
-  for (int64_t begin = 0; begin < n; begin += cells_.rays()) {
-    const int64_t size = std::min(n - begin, cells_.rays());
-    MarchCellsOnDevice(grid, rays + begin, size, options_, lists);
-    ByBasis(grid.basis, grid.exact_sums, [&](auto basis, auto exact) {
-      FitCellRaysKernel<basis.value, exact.value><<<BlocksFor(32 * size), kThreads>>>(
-          grid.view(), rays + begin, targets + begin, size, options_.stop_transmittance, scale,
-          losses, view, lists, grid.spheres.on() ? behind_.data() + begin : nullptr,
-          grid.spheres.on() ? d_behind_.data() + begin : nullptr, sums_.data());
-    });
-    CheckLaunch("fit_cell_rays");
-  }
+  store_ =
+      DeviceBuffer<float>(warps_ * capacity_ * kFloatsPerSample, "samples of rays in flight");
 }
 
 void DeviceRayFitter::Accumulate(const DeviceGrid& grid, const Ray* rays, const Vec3f* targets,
@@ -302,9 +241,6 @@ void DeviceRayFitter::Accumulate(const DeviceGrid& grid, const Ray* rays, const 
                                  const DensityLosses& losses) {
   next_ray_.Zero();
   REGRADE_CHECK(grid.fitting);
-  if (!grid.cells.on() && store_.size() == 0)
-    store_ =
-        DeviceBuffer<float>(warps_ * capacity_ * kFloatsPerSample, "samples of rays in flight");
   const GradientView view{grid.gradient(), touched->bits.data()};
   const bool spheres = grid.spheres.on();
   if (spheres) {
@@ -313,12 +249,6 @@ void DeviceRayFitter::Accumulate(const DeviceGrid& grid, const Ray* rays, const 
       d_behind_ = DeviceBuffer<Vec3f>(n, "gradients of the radiance behind the box");
     }
     SphereRadiance(grid, rays, n, options_, behind_.data());
-  }
-  if (grid.cells.on()) {
-    AccumulateCells(grid, rays, targets, n, scale, touched, losses);
-    if (spheres)
-      SphereRadianceAdjoint(grid, rays, d_behind_.data(), n, options_, touched, sums_.data());
-    return;
   }
   ByBasis(grid.basis, grid.exact_sums, [&](auto basis, auto exact) {
     FitRaysKernel<basis.value, exact.value>
@@ -346,8 +276,6 @@ DeviceRayFitter::DeviceRayFitter(const GridFrame&, const MarchOptions&, int64_t)
 }
 void DeviceRayFitter::Accumulate(const DeviceGrid&, const Ray*, const Vec3f*, int64_t, float,
                                  DeviceTouched*, const DensityLosses&) {}
-void DeviceRayFitter::AccumulateCells(const DeviceGrid&, const Ray*, const Vec3f*, int64_t,
-                                      float, DeviceTouched*, const DensityLosses&) {}
 DeviceFitSums DeviceRayFitter::TakeSums() { return {}; }
 
 #endif

@@ -21,10 +21,7 @@ DeviceGridView DeviceGrid::view() const {
       near_clip,
       {static_cast<float>(frame.resolution.x - 1), static_cast<float>(frame.resolution.y - 1),
        static_cast<float>(frame.resolution.z - 1)},
-      spheres.view(),
-      cells.on() ? cells.view(frame.resolution) : CellsView{},
-      cells.on() ? cells.vertex_key.data() : nullptr,
-      density_rate.size() > 0 ? density_rate.data() : nullptr};
+      spheres.view()};
 }
 
 DeviceGrid UploadGrid(const FastGrid& grid, bool fitting, const Buffer<float>& second_moment,
@@ -35,8 +32,6 @@ DeviceGrid UploadGrid(const FastGrid& grid, bool fitting, const Buffer<float>& s
   device.background = grid.background;
   device.near_clip = grid.near_clip;
   device.links = DeviceBuffer<int32_t>::Of(grid.links, "links");
-  device.cells = UploadCells(grid.cells());
-  device.density_rate = DeviceBuffer<float>::Of(grid.density_rate, "rates of densities");
   device.fitting = fitting;
   device.exact_sums = exact_sums;
   const int64_t n = grid.num_voxels(), row = device.lanes() * int64_t{sizeof(float)};
@@ -72,42 +67,6 @@ Buffer<float> DownloadRows(const DeviceGrid& device, const float* from) {
 
 }  // namespace
 
-DeviceGrid ChangeCellsOnDevice(DeviceGrid grid, const std::vector<CellChange>& change) {
-  // Of the old field's records only one array at a time lies beside the new ones.
-  const Buffer<float> values = DownloadRows(grid, grid.records.data());
-  Buffer<float> moments;
-  if (grid.fitting) moments = DownloadRows(grid, grid.second_moment());
-  grid.records = {};
-  DeviceBuffer<VertexSource> sources;
-  DeviceCells cells = ChangeCellsOnDevice(grid.cells, grid.frame.resolution, change, &sources);
-  const int64_t n = cells.num_vertices(), stride = grid.stride();
-  if (n == 0) {
-    grid.cells = {};
-    return grid;
-  }
-  const int lanes = grid.lanes();
-  const auto move = [&](const DeviceBuffer<float>& values, int width, float factor,
-                        int64_t pitch, float* out) {
-    MoveValuesOnDevice(grid.cells, cells, sources, values.data(), width, factor, pitch, out);
-  };
-  DeviceBuffer<float> records(n * stride, "voxels");
-  if (grid.fitting) {
-    records.Zero();
-    move(DeviceBuffer<float>::Of(moments, "moments of before"), lanes, kMomentOfChildren,
-         stride, records.data() + (stride - lanes));
-  }
-  move(DeviceBuffer<float>::Of(values, "voxels of before"), lanes, 1, stride, records.data());
-  grid.records = std::move(records);
-  if (grid.density_rate.size() > 0) {
-    DeviceBuffer<float> rates(n, "rates of densities");
-    move(grid.density_rate, 1, 1, 1, rates.data());
-    grid.density_rate = std::move(rates);
-  }
-  grid.cells = std::move(cells);
-  RefreshDerived(&grid, n);
-  return grid;
-}
-
 Buffer<float> DownloadSecondMoment(const DeviceGrid& device) {
   return DownloadRows(device, device.second_moment());
 }
@@ -132,8 +91,6 @@ FastGrid DownloadGrid(const DeviceGrid& device) {
   grid.background = device.background;
   grid.near_clip = device.near_clip;
   grid.links = device.links.ToHost();
-  grid.SetCells(DownloadCells(device.cells));
-  grid.density_rate = device.density_rate.ToHost();
   grid.records = DownloadRows(device, device.records.data());
   RefreshDerived(&grid);
   grid.spheres = DownloadSpheres(device.spheres);
@@ -168,12 +125,6 @@ __global__ void ScatterVoxels(DeviceGridView grid, int density_lane, int64_t ver
   distance[vertex] = stored ? 0 : kFar;
 }
 
-__global__ void CopyDensities(DeviceGridView grid, int density_lane) {
-  const int64_t voxel = blockIdx.x * static_cast<int64_t>(blockDim.x) + threadIdx.x;
-  if (voxel < grid.num_voxels)
-    grid.dense_density[voxel] = grid.records[voxel * grid.stride + density_lane];
-}
-
 // One axis of the Chebyshev distance: the minimum of max(distance, steps along the axis).
 __global__ void SpreadAlongAxis(Vec3i n, int axis, int64_t vertices, const uint8_t* from,
                                 uint8_t* to) {
@@ -194,12 +145,6 @@ __global__ void SpreadAlongAxis(Vec3i n, int axis, int64_t vertices, const uint8
 }  // namespace
 
 void RefreshDerived(DeviceGrid* grid, int64_t num_voxels) {
-  if (grid->cells.on()) {
-    grid->dense_density = DeviceBuffer<float>(num_voxels, "densities");
-    CopyDensities<<<BlocksFor(num_voxels), kThreads>>>(grid->view(), DensityLane(grid->basis));
-    CheckLaunch("copy_densities");
-    return;
-  }
   const int64_t vertices = grid->frame.NumVertices();
   grid->vertex_of_voxel = DeviceBuffer<int32_t>(num_voxels, "vertices of voxels");
   grid->dense_density = DeviceBuffer<float>(vertices, "dense densities");

@@ -6,14 +6,12 @@
 #include <cstdint>
 
 #include "kernels/device/device_memory.h"
-#include "kernels/field/cuda/device_cells.h"
 #include "kernels/field/cuda/device_spheres.h"
 #include "kernels/field/packed_grid.h"
 
 namespace regrade {
 
-// A non-owning view for kernels. Shapes as in FastGrid. An adaptive field has cells instead of
-// links, distances and vertices of voxels, and dense_density is [N].
+// A non-owning view for kernels. Shapes as in FastGrid.
 struct DeviceGridView {
   GridFrame frame;
   const int32_t* links = nullptr;            // [X, Y, Z]
@@ -27,9 +25,6 @@ struct DeviceGridView {
   float near_clip = 0;
   Vec3f last{};  // the frame's resolution minus 1
   DeviceSpheresView spheres;
-  CellsView cells;                      // top is null for a uniform grid
-  const CellKey* vertex_key = nullptr;  // [N], of an adaptive field
-  const float* density_rate = nullptr;  // [N], or null; see FastGrid
 
   // Points number the voxels, and from the next multiple of 32 the texels of the background.
   HD int32_t first_texel() const { return (num_voxels + 31) / 32 * 32; }
@@ -39,8 +34,6 @@ struct DeviceGrid {
   GridFrame frame;
   DeviceBuffer<int32_t> links;
   DeviceBuffer<float> dense_density;
-  DeviceCells cells;
-  DeviceBuffer<float> density_rate;
   DeviceBuffer<uint8_t> empty_distance;
   DeviceBuffer<int32_t> vertex_of_voxel;
   DeviceBuffer<float> records;  // [N, stride]
@@ -81,10 +74,6 @@ FastGrid DownloadGrid(const DeviceGrid& grid);
 // Recomputes dense_density, vertex_of_voxel and empty_distance from the existing links and
 // records; `num_voxels` is the number of non-negative links.
 void RefreshDerived(DeviceGrid* grid, int64_t num_voxels);
-
-// Changes the cells of an adaptive field and moves its values as ApplyChanges does; gradients
-// become 0.
-DeviceGrid ChangeCellsOnDevice(DeviceGrid grid, const std::vector<CellChange>& change);
 
 // Prunes and resamples as Resample in resample_grid.h does: a new vertex is kept if the old
 // vertex nearest to it, or one of that vertex's 26 neighbours, has a weight of at least

@@ -3,7 +3,6 @@
 // processes a ray; its lanes first march 32 samples at a time, then hold the values of a voxel.
 #pragma once
 
-#include "kernels/field/cuda/cell_march.h"
 #include "kernels/field/cuda/device_grid.h"
 #include "kernels/field/cuda/half_grid.h"
 #include "kernels/field/density_losses.h"
@@ -31,18 +30,10 @@ void RenderOnDevice(const DeviceGrid& grid, const Ray* rays, int64_t n,
                     const MarchOptions& options, const DeviceRenderTarget& target,
                     float opacity_step = 0);
 
-// Room for the colours of an adaptive field's vertices in a frame; see EQ(vertex-colors).
-struct VertexColors {
-  DeviceBuffer<float> values;  // [V, 4]
-  bool empty() const { return values.empty(); }
-};
-VertexColors MakeVertexColors(const DeviceGrid& grid);
-
-// What makes frames faster, and not exact. The last two need memory; null: exact.
+// What makes frames faster, and not exact.
 struct FastFrames {
-  float opacity_step = 0;          // of a uniform field
-  const HalfGrid* half = nullptr;  // of a uniform field: replaces its colours and densities
-  const VertexColors* colors = nullptr;  // of an adaptive field
+  float opacity_step = 0;
+  const HalfGrid* half = nullptr;  // replaces colours and densities; null or empty: exact
 };
 
 // A frame at a camera without distortion: rays are generated and pixels resolved (see
@@ -88,13 +79,8 @@ class DeviceRayFitter {
   DeviceFitSums* sums() { return sums_.data(); }
 
  private:
-  void AccumulateCells(const DeviceGrid& grid, const Ray* rays, const Vec3f* targets, int64_t n,
-                       float scale, DeviceTouched* touched, const DensityLosses& losses);
-
   MarchOptions options_;
-  int64_t max_bytes_ = 0;
-  CellSampleStore cells_;  // of an adaptive field
-  int64_t capacity_ = 0;   // samples a ray
+  int64_t capacity_ = 0;  // samples a ray
   int warps_ = 0;
   DeviceBuffer<float> store_;
   DeviceBuffer<int32_t> next_ray_;
@@ -107,8 +93,7 @@ void MaxWeightsOnDevice(const DeviceGrid& grid, const Ray* rays, int64_t n,
                         const MarchOptions& options, float* weights);
 
 // Adds the gradient of the total variation (see EQ(total-variation)) of voxels begin, begin +
-// 1, ..., begin + count - 1, modulo their number; of an adaptive field's cells
-// EQ(cell-variation).
+// 1, ..., begin + count - 1, modulo their number.
 void AddTotalVariation(const DeviceGrid& grid, int64_t begin, int64_t count,
                        float scale_density, float scale_sh, DeviceTouched* touched);
 

@@ -3,7 +3,6 @@
 #include <vector>
 
 #include "kernels/base/error.h"
-#include "kernels/field/cuda/device_cell_render.h"
 #include "kernels/field/cuda/device_rays.h"
 #include "kernels/field/cuda/launch.h"
 #include "kernels/field/cuda/ray_shaders.h"
@@ -221,10 +220,7 @@ void RenderBlocks(const DeviceGrid& grid, const HalfGrid* half, const Rays& rays
 void RenderOnDevice(const DeviceGrid& grid, const Ray* rays, int64_t n,
                     const MarchOptions& options, const DeviceRenderTarget& target,
                     float opacity_step) {
-  if (grid.cells.on())
-    RenderCellRays(grid, rays, n, options, target);
-  else
-    RenderBlocks(grid, nullptr, ListedRays{rays, n}, options, opacity_step, target);
+  RenderBlocks(grid, nullptr, ListedRays{rays, n}, options, opacity_step, target);
 }
 
 void RenderFrameOnDevice(const DeviceGrid& grid, const Camera& camera,
@@ -232,11 +228,8 @@ void RenderFrameOnDevice(const DeviceGrid& grid, const Camera& camera,
                          const FastFrames& fast) {
   REGRADE_CHECK(camera.lens == LensModel::kPinhole);
   const DeviceRange range("frame");
-  if (grid.cells.on())
-    RenderCellFrame(grid, camera, options, target, fast.colors);
-  else
-    RenderBlocks(grid, fast.half, FrameRays{PinholeRays(camera), ResolvePixel(camera)}, options,
-                 fast.opacity_step, target);
+  RenderBlocks(grid, fast.half, FrameRays{PinholeRays(camera), ResolvePixel(camera)}, options,
+               fast.opacity_step, target);
 }
 
 #else

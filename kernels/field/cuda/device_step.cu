@@ -2,7 +2,6 @@
 // values of one record.
 #include <algorithm>
 
-#include "kernels/field/cell_variation.h"
 #include "kernels/field/cuda/device_rays.h"
 #include "kernels/field/cuda/gradient_view.h"
 #include "kernels/field/cuda/launch.h"
@@ -66,46 +65,6 @@ __global__ void TotalVariationKernel(DeviceGridView grid, int64_t begin, int64_t
   }
   if (d_own != 0) add(voxel, d_own);
   if (value == 0) Touch(gradient.touched, static_cast<int32_t>(voxel));
-}
-
-// See EQ(cell-variation): of `count` cells from `begin` on, modulo their number; a lane a
-// value.
-template <int kBasis, bool kExact>
-__global__ void CellVariationKernel(DeviceGridView grid, int64_t begin, int64_t count,
-                                    int64_t cells, float scale_density, float scale_sh,
-                                    GradientView gradient) {
-  constexpr int kLanes = RecordLanes(kBasis);
-  const int64_t thread = blockIdx.x * static_cast<int64_t>(blockDim.x) + threadIdx.x;
-  if (thread / kLanes >= count) return;
-  const int value = static_cast<int>(thread % kLanes);
-  const int64_t cell = (begin + thread / kLanes) % cells;
-  const int32_t* const corner = grid.cells.corner + 8 * cell;
-  const bool is_density = value == DensityLane(kBasis);
-  const float unit =
-      is_density ? WorldWidth(grid.frame, 1 << (grid.cells.finest - grid.cells.level[cell]))
-                 : 1.0f;
-  float d[3] = {};
-#pragma unroll
-  for (int k = 0; k < 8; ++k) {
-    const float v = 0.25f * unit * grid.records[corner[k] * grid.stride + value];
-#pragma unroll
-    for (int a = 0; a < 3; ++a) d[a] += k >> (2 - a) & 1 ? v : -v;
-    if (value == 0) Touch(gradient.touched, corner[k]);
-  }
-  const float scale = is_density ? scale_density : value < 3 * kBasis ? scale_sh : 0.0f;
-  const float inverse =
-      0.25f * unit * scale * rsqrtf(1e-9f + d[0] * d[0] + d[1] * d[1] + d[2] * d[2]);
-#pragma unroll
-  for (int k = 0; k < 8; ++k) {
-    const float g =
-        inverse * ((k & 4 ? d[0] : -d[0]) + (k & 2 ? d[1] : -d[1]) + (k & 1 ? d[2] : -d[2]));
-    if (g == 0) continue;
-    float* const row = gradient.gradient + corner[k] * grid.stride;
-    if constexpr (kExact)
-      AddExact(row, value, g);
-    else
-      atomicAdd(row + value, g);
-  }
 }
 
 // Update rules of a lane's four consecutive values of a record in the step kernel.
@@ -212,26 +171,18 @@ __global__ void StepKernel(DeviceGridView grid, uint32_t* __restrict__ touched, 
         m.y = NextMoment(m.y, g.y, options.beta);
         m.z = NextMoment(m.z, g.z, options.beta);
         m.w = NextMoment(m.w, g.w, options.beta);
-        constexpr int kDensity = DensityLane(kBasis);
-        const float factor = grid.density_rate != nullptr && quad == kDensity / 4
-                                 ? grid.density_rate[q[i].voxel]
-                                 : 1.0f;
-        const auto rate = [&](int lane_value) {
-          return rules.rate[lane_value] * (lane_value == kDensity % 4 ? factor : 1.0f);
-        };
-        x.x = Stepped(x.x, g.x, m.x, rate(0), rules.bound[0], options.epsilon);
-        x.y = Stepped(x.y, g.y, m.y, rate(1), rules.bound[1], options.epsilon);
-        x.z = Stepped(x.z, g.z, m.z, rate(2), rules.bound[2], options.epsilon);
-        x.w = Stepped(x.w, g.w, m.w, rate(3), rules.bound[3], options.epsilon);
+        x.x = Stepped(x.x, g.x, m.x, rules.rate[0], rules.bound[0], options.epsilon);
+        x.y = Stepped(x.y, g.y, m.y, rules.rate[1], rules.bound[1], options.epsilon);
+        x.z = Stepped(x.z, g.z, m.z, rules.rate[2], rules.bound[2], options.epsilon);
+        x.w = Stepped(x.w, g.w, m.w, rules.rate[3], rules.bound[3], options.epsilon);
         q[i].at[0] = x;
         q[i].at[kMoment] = m;
+        constexpr int kDensity = DensityLane(kBasis);
         if (quad == kDensity / 4)
-          grid.dense_density[grid.cells.top != nullptr ? q[i].voxel
-                                                       : grid.vertex_of_voxel[q[i].voxel]] =
-              kDensity % 4 == 0   ? x.x
-              : kDensity % 4 == 1 ? x.y
-              : kDensity % 4 == 2 ? x.z
-                                  : x.w;
+          grid.dense_density[grid.vertex_of_voxel[q[i].voxel]] = kDensity % 4 == 0   ? x.x
+                                                                 : kDensity % 4 == 1 ? x.y
+                                                                 : kDensity % 4 == 2 ? x.z
+                                                                                     : x.w;
       }
       __syncwarp();
     }
@@ -244,16 +195,6 @@ void AddTotalVariation(const DeviceGrid& grid, int64_t begin, int64_t count,
                        float scale_density, float scale_sh, DeviceTouched* touched) {
   REGRADE_CHECK(grid.fitting);
   if (count <= 0) return;
-  if (grid.cells.on()) {
-    ByBasis(grid.basis, grid.exact_sums, [&](auto basis, auto exact) {
-      CellVariationKernel<basis.value, exact.value>
-          <<<BlocksFor(count * grid.lanes()), kThreads>>>(
-              grid.view(), begin, count, grid.cells.num_cells(), scale_density, scale_sh,
-              GradientView{grid.gradient(), touched->bits.data()});
-    });
-    CheckLaunch("cell_variation");
-    return;
-  }
   ByBasis(grid.basis, grid.exact_sums, [&](auto basis, auto exact) {
     TotalVariationKernel<basis.value, exact.value>
         <<<BlocksFor(count * grid.lanes()), kThreads>>>(

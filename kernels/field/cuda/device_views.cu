@@ -53,27 +53,6 @@ __global__ void RaysKernel(DeviceViews::View view, const Vec3f* directions, int 
                        static_cast<int>(i / columns) * stride);
 }
 
-__global__ void TargetsKernel(DeviceViews::View view, const uint16_t* colors,
-                              const int32_t* drawn, int stride, int columns, int64_t n,
-                              Vec3f* targets) {
-  const int64_t i = blockIdx.x * static_cast<int64_t>(blockDim.x) + threadIdx.x;
-  if (i >= n) return;
-  const int64_t pixel = i / columns * stride * view.width + i % columns * stride;
-  bool counts = view.num_drawn == 0;
-  for (int32_t low = 0, high = view.num_drawn;
-       low < high && !counts;) {  // drawn pixels are in order
-    const int32_t middle = low + (high - low) / 2, at = drawn[view.drawn + middle];
-    counts = at == pixel;
-    if (at < pixel)
-      low = middle + 1;
-    else
-      high = middle;
-  }
-  const uint16_t* const color = colors + view.color + 3 * pixel;
-  targets[i] = counts ? Vec3f{color[0] / 65535.0f, color[1] / 65535.0f, color[2] / 65535.0f}
-                      : Vec3f{NAN, NAN, NAN};
-}
-
 }  // namespace
 
 DeviceViews::DeviceViews(const std::vector<std::vector<Vec3f>>& direction_maps,
@@ -128,18 +107,8 @@ int64_t DeviceViews::RaysOf(int view, int stride, Ray* rays) const {
   return n;
 }
 
-void DeviceViews::TargetsOf(int view, int stride, Vec3f* targets) const {
-  const View& v = host_views_[static_cast<size_t>(view)];
-  const int columns = (v.width + stride - 1) / stride;
-  const int64_t n = RaysOf(view, stride, nullptr);
-  TargetsKernel<<<BlocksFor(n), kThreads>>>(v, colors_.data(), drawn_.data(), stride, columns,
-                                            n, targets);
-  CheckLaunch("targets_of_view");
-}
-
 #else
 
-void DeviceViews::TargetsOf(int, int, Vec3f*) const {}
 DeviceViews::DeviceViews(const std::vector<std::vector<Vec3f>>&,
                          const std::vector<DeviceViewSource>&) {
   DeviceWait("draw_rays");

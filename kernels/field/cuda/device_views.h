@@ -33,9 +33,6 @@ class DeviceViews {
   // Rays of every `stride`-th pixel of a view, row by row; returns their number. rays may be
   // null to count only.
   int64_t RaysOf(int view, int stride, Ray* rays) const;
-  // The colours of the same pixels, sRGB; NaN where no ray is drawn.
-  void TargetsOf(int view, int stride, Vec3f* targets) const;
-  int WidthOf(int view) const { return host_views_[static_cast<size_t>(view)].width; }
   int num_views() const { return static_cast<int>(host_views_.size()); }
 
   // A view as kernels see it.

@@ -67,9 +67,7 @@ __global__ void FillRecords(DeviceGridView grid, BrickOrder order, const int32_t
 HalfGrid MakeHalfGrid(const DeviceGrid& grid) {
   HalfGrid half;
   const BrickOrder order(grid.frame.resolution);
-  if (grid.cells.on() || grid.basis != kBasis || grid.num_voxels() == 0 ||
-      order.size > INT32_MAX)
-    return half;
+  if (grid.basis != kBasis || grid.num_voxels() == 0 || order.size > INT32_MAX) return half;
   half.order = order;
   half.links = DeviceBuffer<int32_t>(order.size, "links by bricks");
   half.density_pairs = DeviceBuffer<uint32_t>(order.size, "densities in half precision");

@@ -20,8 +20,7 @@ struct HalfGridView {
   float near_clip = 0;
 };
 
-// Only for uniform fields of degree 2; for others it stays empty: records of a lower degree are
-// small, and an adaptive field has no arrays over the box.
+// Only for fields of degree 2; for others it stays empty: records of a lower degree are small.
 struct HalfGrid {
   BrickOrder order;
   DeviceBuffer<int32_t> links;           // [order.size]: records, or -1

@@ -79,17 +79,6 @@ class GridSampler {
   const DeviceGridView& grid_;
 };
 
-// The corners of an adaptive field's cells; a "vertex" is eight times the cell.
-class CellSampler {
- public:
-  __device__ explicit CellSampler(const DeviceGridView& grid) : corner_(grid.cells.corner) {}
-  __device__ NeighbourSteps Steps(int) const { return {4, 2, 1}; }
-  __device__ int32_t Link(int at) const { return corner_[at]; }
-
- private:
-  const int32_t* corner_;
-};
-
 // LocateCell of trilinear.h, bit for bit, without conversions between integers and floats,
 // which are slow on a GPU: adding 2^23 and rounding down leaves the integer in the low bits.
 // The cell's vertex is the sampler's index.

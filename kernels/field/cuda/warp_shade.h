@@ -71,11 +71,11 @@ __device__ inline float4 LoadQuad(const float* from) {
 
 // The colour, before the clamp, of the sample of the lane's group. All lanes of the warp take
 // part; the lanes of a group have the same sample and get the same colour. See EQ(sh-basis).
-template <int kBasis, typename Sampler = GridSampler>
+template <int kBasis>
 __device__ Vec3f RawColor(const DeviceGridView& grid, const LaneValues<kBasis>& values,
                           int vertex, const Vec3f& fraction, bool valid, int lane) {
   using Layout = RecordLayout<kBasis>;
-  const GroupLinks<Layout::kGroup> links(Sampler(grid), vertex, valid, lane);
+  const GroupLinks<Layout::kGroup> links(GridSampler(grid), vertex, valid, lane);
   const float* mine = grid.records + lane % Layout::kGroup * Layout::kValues;
   float4 corner[8];  // all loads are issued before the first is used
 #pragma unroll

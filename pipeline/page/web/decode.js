@@ -29,33 +29,24 @@ function cornersOf(corner, order, voxels) {
   return {corner: words, base: Int32Array.from(base), voxel: voxel.slice(0, count)};
 }
 
-// `text`: of the sections places (tree or mask), density and color. Calls progress(part).
+// `text`: of the sections places, density and color. Calls progress(part).
 async function decodeVoxels(header, text, progress) {
-  const {resolution, basis} = header, onCells = header.finest !== null;
+  const {resolution, basis} = header;
   checkCode(header.color, 'color');
   const bytes = await inflated(text.places, 'places');
   await progress(0.05);
-  let places = null, vertices;
-  if (onCells) {
-    places = placesOfTree(bytes, resolution, header.finest, header.voxels);
-    vertices = places.vertices;
-  } else {
-    vertices = placesOfMask(bytes, resolution, header.voxels);
-  }
-  const n = vertices.count, {place, width} = vertices;
+  const vertices = new Vertices(bytes, resolution, header.voxels), n = vertices.count, {place} = vertices;
   if (n !== header.voxels) throw new PageError('the page has fewer voxels than it says');
   const earlier = vertices.earlier.subarray(0, 3 * n);
   await progress(0.35);
   const number = await unpackDensity(text.density, 'density', earlier);
-  if (!onCells) places = cellsOfGrid(vertices, resolution, number);
-  vertices.slot = null;  // the largest table; it isn't needed any more
+  let places = cellsOfGrid(vertices, resolution, number);
   await progress(0.4);
   places = raisedTree(places);
-  const rootOfWidth = Array.from({length: 32}, (_, log2) => 2 ** (-0.5 * log2));
-  const {tree, order} = packedTree(places, (i) => i < n ? number[i] * rootOfWidth[width[i]] : 0);
+  const {tree, order} = packedTree(places, (i) => i < n ? number[i] : 0);
   await progress(0.5);
   const {corner, base, voxel} = cornersOf(places.corner, order, n), slots = voxel.length;
-  const made = {top: places.top, finest: places.finest, cells: order.length, voxels: n, tree, corner, base, voxel};
+  const made = {top: places.top, finest: places.finest, voxels: n, tree, corner, base, voxel};
   places = null;
   await progress(0.6);
 
@@ -77,7 +68,7 @@ async function decodeVoxels(header, text, progress) {
   }
   made.positionUnit = resolution.map((r) => 2 * 2 ** halvings / r);
   made.slots = slots;
-  made.shift = onCells ? 0 : 0.5;
+  made.shift = 0.5;
   made.earlier = header.residuals ? earlier.slice() : new Int32Array(0);
   return made;
 }

@@ -51,7 +51,7 @@ class Graphics {
   // processors take seconds to compile.
   marchOf({header}, count) {
     const gl = this.gl, sets = count > 1 ? 3 : 1;
-    const parts = `#define CELLS ${header.finest === null ? 0 : 1}\n#define SPHERES ${header.spheres ? 1 : 0}\n#define SETS ${sets}\n`;
+    const parts = `#define SPHERES ${header.spheres ? 1 : 0}\n#define SETS ${sets}\n`;
     return this.marches[parts] ??= {sets, warm: false, ...compile(gl, [
       [gl.VERTEX_SHADER, EVERY_PIXEL], [gl.FRAGMENT_SHADER, withColors(MARCH_GLSL).replace('\n', '\n' + parts)]])};
   }

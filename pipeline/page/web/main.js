@@ -11,7 +11,6 @@ function readHeader(added) {
   const numbers = (v, n) => Array.isArray(v) && v.length === n && v.every(Number.isFinite);
   const isField = (h) => numbers(h.resolution, 3) && numbers(h.center, 3) && numbers(h.radius, 3) &&
       h.voxels > 0 && h.voxels <= 1 << 26 && [1, 4, 9].includes(h.basis) && h.resolution.every((n) => n >= 0 && n <= 1 << 20) &&
-      (h.finest === null || h.finest >= 0 && h.finest <= 16) &&
       (!h.splats || h.splats.coarse >= 0 && h.splats.coarse <= h.voxels && h.splats.position_step > 0);
   if (!isField(header) || header.coarse && !isField(header.coarse) || !header.cameras?.[header.home])
     throw new PageError('a part of the page is damaged: scene');

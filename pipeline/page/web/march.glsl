@@ -1,6 +1,6 @@
 #version 300 es
-// One ray for each pixel through cells of all levels (CELLS), or a uniform grid, and background spheres (SPHERES), with the
-// colours of up to SETS mixed; see the C++ headers kernels/field/cell_walk.h, ray_march.h and background_spheres.h.
+// One ray for each pixel through a grid of voxels and background spheres (SPHERES), with the colours of up to SETS mixed; see
+// the C++ headers kernels/field/ray_march.h and background_spheres.h.
 precision highp float;
 precision highp int;
 precision highp isampler2D;
@@ -74,15 +74,13 @@ uvec4 TexelAt(ivec3 at, out int width) {
     uint child = Eighth((at >> (shift - 1)) & 1), half_ = child >> 2;
     uint word = half_ == 0u ? texel.z : texel.w, first = 8u * (child & 3u);
     --shift;
-    if ((texel.y >> child & 1u) == 0u) {
-      if ((word >> first & 255u) == 0u) {
-        texel = uvec4(1u << 31, 0u, 0u, 0u);
-        ++depth;
-        break;
-      }
-      --shift;
-      first += Eighth((at >> shift) & 1);
+    if ((word >> first & 255u) == 0u) {
+      texel = uvec4(1u << 31, 0u, 0u, 0u);
+      ++depth;
+      break;
     }
+    --shift;
+    first += Eighth((at >> shift) & 1);
     if ((word >> first & 1u) == 0u) {
       texel = uvec4(1u << 31, 0u, 0u, 0u);
       ++depth;
@@ -105,13 +103,13 @@ void Weights(vec3 f, out vec4 low, out vec4 high) {
   high = yz * f.x;
 }
 
-float DensityIn(uvec4 cell, int width, vec3 f) {
+float DensityIn(uvec4 cell, vec3 f) {
   vec4 a, b;
   Weights(f, a, b);
   vec4 low = vec4(cell.y & 4095u, cell.y >> 12 & 4095u, cell.z & 4095u, cell.z >> 12 & 4095u) - 2048.0;
   vec4 high = vec4(cell.w & 4095u, cell.w >> 12 & 4095u, cell.y >> 24 | (cell.z >> 16 & 0xf00u),
                    cell.z >> 28 | (cell.w >> 20 & 0xff0u)) - 2048.0;
-  return (dot(a, low * abs(low)) + dot(b, high * abs(high))) * (kOpticalDepth / 16.0) / float(width);
+  return (dot(a, low * abs(low)) + dot(b, high * abs(high))) * (kOpticalDepth / 16.0);
 }
 
 vec4 Codes(uint w) {
@@ -193,50 +191,6 @@ void Composite(int cell, vec3 f, float density, float delta) {
   }
 }
 
-#if CELLS
-void March(vec3 eye, vec3 direction) {
-  vec3 scale = 0.5 * vec3(uVoxels) / uRadius, middle = vec3(uVoxels) * 0.5;
-  vec3 o = (eye - uCenter) * scale, d = direction * scale;
-  vec3 inverse = mix(1.0 / d, vec3(0.0), equal(d, vec3(0.0)));
-  float begin = uNear, end = 3.4e38;
-  for (int a = 0; a < 3; ++a) {
-    if (d[a] == 0.0) {
-      if (!(o[a] >= -middle[a] && o[a] < middle[a])) return;
-      continue;
-    }
-    float t0 = (-middle[a] - o[a]) * inverse[a], t1 = (middle[a] - o[a]) * inverse[a];
-    begin = max(begin, min(t0, t1));
-    end = min(end, max(t0, t1));
-  }
-  if (!(end > begin)) return;
-  ivec3 at = clamp(ivec3(floor(o + d * begin) + middle), ivec3(0), uVoxels - 1);
-  float t = begin;
-  for (int i = 0; i < 16384; ++i) {
-    int width;
-    uvec4 cell = TexelAt(at, width);
-    ivec3 low = at & ~(width - 1);
-    vec3 face = vec3(low) + vec3(width) * vec3(greaterThan(d, vec3(0.0))) - middle;
-    vec3 crossing = mix((face - o) * inverse, vec3(3.4e38), equal(d, vec3(0.0)));
-    float next = min(end, min(crossing.x, min(crossing.y, crossing.z)));
-    int axis = next == crossing.x ? 0 : next == crossing.y ? 1 : next == crossing.z ? 2 : -1;
-    bool last = axis < 0 || !(next < end);
-    next = max(next, t);
-    if (cell.x >> 31 == 0u) {
-      vec3 inside = (o + d * (0.5 * (t + next)) - (vec3(low) - middle)) / float(width);
-      vec3 f = clamp(inside, 0.0, 1.0);
-      Composite(int(cell.x), f, DensityIn(cell, width, f), (next - t) / uUnit);
-      if (Ended()) return;
-    }
-    if (last) return;
-    ivec3 then = clamp(ivec3(floor(o + d * next) + middle), low, low + (width - 1));
-    then[axis] = d[axis] > 0.0 ? low[axis] + width : low[axis] - 1;
-    if (then[axis] < 0 || then[axis] >= uVoxels[axis]) return;
-    at = then;
-    t = next;
-  }
-}
-
-#else
 void March(vec3 eye, vec3 direction) {
   vec3 scale = 0.5 * vec3(uVoxels) / uRadius;
   vec3 o = eye * scale + 0.5 * vec3(uVoxels) - 0.5 - uCenter * scale, d = direction * scale;
@@ -265,7 +219,7 @@ void March(vec3 eye, vec3 direction) {
     uvec4 cell = TexelAt(base, width);
     if (cell.x >> 31 == 0u) {
       vec3 f = p - vec3(base);
-      Composite(int(cell.x), f, DensityIn(cell, width, f), delta);
+      Composite(int(cell.x), f, DensityIn(cell, f), delta);
       if (Ended()) return;
       ++i;
       continue;
@@ -282,8 +236,6 @@ void March(vec3 eye, vec3 direction) {
     i = max(i + 1, int(floor((leave - begin) / uStep)));
   }
 }
-
-#endif
 
 #if SPHERES
 vec3 LayerColor(uvec4 texel, float w, int set) {

@@ -156,7 +156,7 @@ function factsOf(header, scene, graphics, painter) {
   const number = (n) => n.toLocaleString('en');
   const rows = [
     ...header.splats ? [['Splats', number(header.voxels)]]
-        : [['Voxels', number(header.voxels)], ['Cells', scene.coarse ? 'being unpacked' : number(scene.cells)]],
+        : [['Voxels', number(header.voxels)]],
     ['Size of this page', (document.documentElement.innerHTML.length / 1e6).toFixed(1) + ' MB'],
     ['On the graphics processor', (graphics.bytes / 1e6).toFixed(0) + ' MB'],
     ['Picture', painter.full.width + ' x ' + painter.full.height],

@@ -1,181 +1,173 @@
 // Places of voxels, and the tree in which a ray finds them; pipeline/page/page_order.h says how
 // they are stored.
 
-const cornerOf = (low, width, k) =>
-    [low[0] + (k >> 2) * width, low[1] + (k >> 1 & 1) * width, low[2] + (k & 1) * width];
+const onesOfByte = Uint8Array.from({length: 256}, (_, b) => {
+  let ones = 0;
+  for (; b > 0; b >>= 1) ones += b & 1;
+  return ones;
+});
 
-// Vertices by their places, numbered as they come.
+// The voxels of a mask in their order. A brick has 8 x 8 rows along z: a byte, of whose bits one is set for each voxel, and
+// the number of voxels before it. So a voxel's number is found from its place without a table of places.
 class Vertices {
-  constructor(most) {
-    this.count = 0;
-    this.most = most;
-    this.place = new Int32Array(3 * most);
-    this.earlier = new Int32Array(3 * most).fill(-1);
-    this.width = new Uint8Array(most);  // logarithm of the widest cell around it
-    let size = 16;
-    while (size < 2 * most) size *= 2;
-    this.slot = new Int32Array(size).fill(-1);
-  }
-  // The number of a place; a new one is added where `add` is set, else -1.
-  find(x, y, z, add) {
-    let at = (Math.imul(x, 73856093) ^ Math.imul(y, 19349663) ^ Math.imul(z, 83492791));
-    at = Math.imul(at ^ at >>> 15, 0x2c1b3c6d);
-    const mask = this.slot.length - 1;
-    const {slot, place} = this;
-    for (at = (at ^ at >>> 13) & mask; slot[at] >= 0; at = at + 1 & mask) {
-      const i = slot[at];
-      if (place[3 * i] === x && place[3 * i + 1] === y && place[3 * i + 2] === z) return i;
-    }
-    if (!add) return -1;
-    if (this.count >= this.most) throw new PageError('the page has more voxels than it says');
-    const own = this.count++;
-    place[3 * own] = x;
-    place[3 * own + 1] = y;
-    place[3 * own + 2] = z;
-    return this.slot[at] = own;
-  }
-}
-
-// The tree has the top cells, then nodes of eight entries each: a cell, -1 nothing, -2 - n node n.
-
-// -> {vertices, top, tree, corner [8 cells]}
-function placesOfTree(bytes, voxels, finest, count) {
-  const top = voxels.map((n) => n >> finest), topCells = top[0] * top[1] * top[2];
-  let cells = 0, nodes = 0;
-  for (const byte of bytes)
-    for (let s = 0; s < 8; s += 2) {
-      cells += (byte >> s & 3) === 1;
-      nodes += (byte >> s & 3) === 2;
-    }
-  const vertices = new Vertices(count), tree = new Int32Array(topCells + 8 * nodes).fill(-1);
-  const corner = new Int32Array(8 * cells), own = new Int32Array(8), {earlier, width} = vertices;
-  // The vertices of a node's children that are known already, [levels, 3, 3, 3]: half of all would be found again.
-  const known = new Int32Array(27 * (finest + 1));
-  let symbol = 0, cell = 0, node = 0, predicted = 0;
-
-  // `child` of the node whose vertices begin at `of` of `known`; -1: a top cell.
-  function addCell(x, y, z, log2, child, of) {
-    const side = 1 << log2, first = child < 0 ? 0 : of + 9 * (child >> 2) + 3 * (child >> 1 & 1) + (child & 1);
-    for (let k = 0; k < 8; ++k) {
-      const at = first + 9 * (k >> 2) + 3 * (k >> 1 & 1) + (k & 1);
-      let i = child < 0 ? -1 : known[at];
-      if (i < 0) {
-        i = vertices.find(x + (k >> 2) * side, y + (k >> 1 & 1) * side, z + (k & 1) * side, true);
-        if (child >= 0) known[at] = i;
-      }
-      own[k] = i;
-      if (width[i] < log2) width[i] = log2;
-      corner[8 * cell + k] = i;
-    }
-    for (let k = 0; k < 8; ++k) {
-      const i = own[k];
-      if (i < predicted) continue;
-      predicted = i + 1;
-      let n = 0;
-      for (let edge = 1; edge < 8; edge *= 2)
-        if (own[k ^ edge] < i) earlier[3 * i + n++] = own[k ^ edge];
-      if (n === 0) earlier[3 * i] = i - 1;
-    }
-    return cell++;
-  }
-  function visit(x, y, z, level, child, of) {
-    if (symbol >> 2 >= bytes.length) throw new PageError('the tree of cells ends too early');
-    const kind = bytes[symbol >> 2] >> 2 * (symbol & 3) & 3;
-    ++symbol;
-    if (kind === 0) return -1;
-    if (kind === 1) return addCell(x, y, z, finest - level, child, of);
-    if (kind !== 2 || level >= finest) throw new PageError('the tree of cells is damaged');
-    const first = topCells + 8 * node, entry = -2 - node++, half = 1 << finest - level - 1, own = 27 * level;
-    known.fill(-1, own, own + 27);
-    for (let k = 0; k < 8; ++k)
-      tree[first + k] = visit(x + (k >> 2) * half, y + (k >> 1 & 1) * half, z + (k & 1) * half, level + 1, k, own);
-    return entry;
-  }
-  let at = 0;
-  for (let x = 0; x < top[0]; ++x)
-    for (let y = 0; y < top[1]; ++y)
-      for (let z = 0; z < top[2]; ++z) tree[at++] = visit(x << finest, y << finest, z << finest, 0, -1, 0);
-  return {vertices, top, tree, corner, finest};
-}
-
-// The same of a uniform grid: its voxels first, cells and a tree around them by cellsOfGrid.
-function placesOfMask(bytes, voxels, count) {
-  const brick = 8, bricks = voxels.map((n) => Math.ceil(n / brick));
-  const flags = bricks[0] * bricks[1] * bricks[2];
-  const vertices = new Vertices(count);
-  let next = Math.ceil(flags / 8), at = 0;
-  for (let x = 0; x < bricks[0]; ++x)
-    for (let y = 0; y < bricks[1]; ++y)
-      for (let z = 0; z < bricks[2]; ++z, ++at) {
-        if (!(bytes[at >> 3] >> (at & 7) & 1)) continue;
-        if (next + 64 > bytes.length) throw new PageError('the mask of voxels ends too early');
-        for (let i = 0; i < 512; ++i) {
-          const p = [x * brick + (i >> 6), y * brick + (i >> 3 & 7), z * brick + (i & 7)];
-          if (p[0] >= voxels[0] || p[1] >= voxels[1] || p[2] >= voxels[2]) continue;
-          if (!(bytes[next + (i >> 3)] >> (i & 7) & 1)) continue;
-          const own = vertices.find(p[0], p[1], p[2], true);
-          let n = 0;
-          for (let a = 0; a < 3; ++a) {
-            const before = p.slice();
-            --before[a];
-            const other = vertices.find(before[0], before[1], before[2], false);
-            if (other >= 0) vertices.earlier[3 * own + n++] = other;
+  constructor(mask, voxels, most) {
+    const [nx, ny, nz] = this.bricks = voxels.map((n) => Math.ceil(n / 8)), flags = nx * ny * nz, begin = Math.ceil(flags / 8);
+    const has = (at) => mask[at >> 3] >> (at & 7) & 1;
+    let stored = 0;
+    if (mask.length >= begin) for (let at = 0; at < flags; ++at) stored += has(at);
+    if (mask.length < begin + 64 * stored) throw new PageError('the mask of voxels ends too early');
+    this.none = 64 * stored;  // first row of an empty brick, which stands for those that aren't stored
+    this.row = new Int32Array(flags).fill(this.none);
+    this.bits = new Uint8Array(64 * (stored + 1));
+    this.before = new Int32Array(64 * (stored + 1));
+    let row = 0, count = 0;
+    for (let x = 0, at = 0; x < nx; ++x)
+      for (let y = 0; y < ny; ++y)
+        for (let z = 0; z < nz; ++z, ++at) {
+          if (!has(at)) continue;
+          this.row[at] = row;
+          for (let r = 0; r < 64; ++r, ++row) {
+            this.bits[row] = mask[begin + row] & rowInside(voxels, x, y, z, r);
+            this.before[row] = count;
+            count += onesOfByte[this.bits[row]];
           }
-          if (n === 0) vertices.earlier[3 * own] = own - 1;
         }
-        next += 64;
+    if (count > most) throw new PageError('the page has more voxels than it says');
+    this.count = count;
+    this.place = new Int32Array(3 * count);
+    this.earlier = new Int32Array(3 * count).fill(-1);
+    for (let x = 0; x < nx; ++x)
+      for (let y = 0; y < ny; ++y)
+        for (let z = 0; z < nz; ++z) if (this.rowOf(x, y, z) !== this.none) this.putBrick(x, y, z);
+  }
+  // The first row of a brick, which may be outside.
+  rowOf(x, y, z) {
+    const [nx, ny, nz] = this.bricks;
+    return x < 0 || y < 0 || z < 0 || x >= nx || y >= ny || z >= nz ? this.none : this.row[(x * ny + y) * nz + z];
+  }
+  // Places of a brick's voxels, and the neighbours before them.
+  putBrick(x, y, z) {
+    const {bits, before, place, earlier} = this, first = this.rowOf(x, y, z);
+    const beforeX = this.rowOf(x - 1, y, z), beforeY = this.rowOf(x, y - 1, z), beforeZ = this.rowOf(x, y, z - 1);
+    for (let r = 0, own = before[first]; r < 64; ++r) {
+      const all = bits[first + r], c = beforeZ + r;
+      const a = r >> 3 ? first + r - 8 : beforeX + r + 56, b = r & 7 ? first + r - 1 : beforeY + r + 7;
+      for (let k = 0; k < 8; ++k) {
+        if (!(all >> k & 1)) continue;
+        const lower = (1 << k) - 1;
+        let n = 3 * own;
+        if (bits[a] >> k & 1) earlier[n++] = before[a] + onesOfByte[bits[a] & lower];
+        if (bits[b] >> k & 1) earlier[n++] = before[b] + onesOfByte[bits[b] & lower];
+        if (k > 0 ? all >> k - 1 & 1 : bits[c] >> 7) earlier[n++] = k > 0 ? own - 1 : before[c] + onesOfByte[bits[c]] - 1;
+        if (n === 3 * own) earlier[n] = own - 1;
+        place[3 * own] = 8 * x + (r >> 3);
+        place[3 * own + 1] = 8 * y + (r & 7);
+        place[3 * own++ + 2] = 8 * z + k;
       }
-  return vertices;
-}
-
-// Cells of a uniform grid that a ray can see, in a tree of cubes of eight. A corner without a
-// voxel is voxel `count`, whose values are 0. `number`: densities, positive where light is stopped.
-function cellsOfGrid(vertices, voxels, number) {
-  const finest = 3, top = voxels.map((n) => Math.ceil((n - 1) / 8));
-  const found = new Map(), {place, count} = vertices;
-  const seen = new Map();  // of a cube: the cells in it
-  for (let i = 0; i < count; ++i) {
-    if (number[i] <= 0) continue;
-    for (let k = 0; k < 8; ++k) {
-      const x = place[3 * i] - (k >> 2), y = place[3 * i + 1] - (k >> 1 & 1), z = place[3 * i + 2] - (k & 1);
-      if (x < 0 || y < 0 || z < 0 || x > voxels[0] - 2 || y > voxels[1] - 2 || z > voxels[2] - 2) continue;
-      const cube = ((x >> 3) * top[1] + (y >> 3)) * top[2] + (z >> 3);
-      let mask = seen.get(cube);
-      if (!mask) seen.set(cube, mask = new Uint8Array(512));
-      mask[(x & 7) << 6 | (y & 7) << 3 | z & 7] = 1;
     }
   }
-  const topCells = top[0] * top[1] * top[2], tree = [], corner = [];
-  const head = new Int32Array(topCells).fill(-1);
-  function build(mask, low, x, y, z, width) {
-    if (width === 1) {
-      if (!mask[x << 6 | y << 3 | z]) return -1;
-      for (let k = 0; k < 8; ++k) {
-        const p = cornerOf([low[0] + x, low[1] + y, low[2] + z], 1, k);
-        const i = vertices.find(p[0], p[1], p[2], false);
-        corner.push(i < 0 ? count : i);
-      }
-      return corner.length / 8 - 1;
+}
+
+// The bits of row r of a brick that are inside of a box.
+function rowInside(size, x, y, z, r) {
+  return 8 * x + (r >> 3) < size[0] && 8 * y + (r & 7) < size[1] ? (1 << Math.max(0, Math.min(8, size[2] - 8 * z))) - 1 : 0;
+}
+
+// Bits of n x n x n places, in rows along z, as those of places twice as wide: set where one of the eight is.
+function widened(rows, n, into) {
+  for (let x = 0, at = 0; x < n; x += 2)
+    for (let y = 0; y < n; y += 2, ++at) {
+      let b = rows[x * n + y] | rows[x * n + y + 1] | rows[x * n + n + y] | rows[x * n + n + y + 1];
+      b |= b >> 1;
+      into[at] = b & 1 | b >> 1 & 2 | b >> 2 & 4 | b >> 3 & 8;
     }
-    const half = width / 2, entry = [];
-    const saved = corner.length;
+}
+
+// The cells that a ray can see, cube of eight by cube: those with a corner where light is stopped. `seen` are their bits in rows
+// along z, of one cell, and of two and of four along an edge.
+class SeenCells {
+  constructor(vertices, voxels, number) {
+    const {bits, before} = vertices, stops = new Uint8Array(bits.length);
+    for (let row = 0; row < bits.length; ++row)
+      for (let k = 0, i = before[row]; bits[row] >> k > 0; ++k)
+        if (bits[row] >> k & 1 && number[i++] > 0) stops[row] |= 1 << k;
+    Object.assign(this, {vertices, stops, inside: voxels.map((n) => n - 1), rows: new Int32Array(8), wide: new Uint16Array(81),
+                         seen: [new Uint8Array(64), new Uint8Array(16), new Uint8Array(4)]});
+  }
+  // False if there is none in a cube.
+  find(x, y, z) {
+    const {vertices, stops, inside, rows, wide, seen} = this;
+    let any = false;
     for (let k = 0; k < 8; ++k) {
-      const p = cornerOf([x, y, z], half, k);
-      entry.push(build(mask, low, p[0], p[1], p[2], half));
+      rows[k] = vertices.rowOf(x + (k >> 2), y + (k >> 1 & 1), z + (k & 1));
+      any ||= rows[k] !== vertices.none;
     }
-    if (corner.length === saved) return -1;
-    const node = tree.length / 8;
-    for (const e of entry) tree.push(e);
+    if (!any) return false;
+    for (let i = 0, at = 0; i < 9; ++i)
+      for (let j = 0; j < 9; ++j, ++at) {
+        const k = (i >> 3) << 2 | (j >> 3) << 1, r = (i & 7) << 3 | j & 7;
+        wide[at] = stops[rows[k] + r] | stops[rows[k + 1] + r] << 8;
+      }
+    any = false;
+    for (let r = 0; r < 64; ++r) {
+      const at = 9 * (r >> 3) + (r & 7), b = wide[at] | wide[at + 1] | wide[at + 9] | wide[at + 10];
+      seen[0][r] = (b | b >> 1) & rowInside(inside, x, y, z, r);
+      any ||= seen[0][r] > 0;
+    }
+    widened(seen[0], 8, seen[1]);
+    widened(seen[1], 4, seen[2]);
+    return any;
+  }
+  // The voxels at the 9 x 9 x 9 corners of the cube that was found last, `vertices.count` where there is none.
+  putVoxels(into) {
+    const {bits, before, count} = this.vertices;
+    for (let i = 0, at = 0; i < 9; ++i)
+      for (let j = 0; j < 9; ++j) {
+        const k = (i >> 3) << 2 | (j >> 3) << 1, r = (i & 7) << 3 | j & 7, low = this.rows[k] + r, high = this.rows[k + 1] + r;
+        for (let b = bits[low], n = before[low], l = 0; l < 8; ++l) into[at++] = b >> l & 1 ? n++ : count;
+        into[at++] = bits[high] & 1 ? before[high] : count;
+      }
+  }
+}
+
+// The tree has the top cubes, then nodes of eight entries each: a cell, -1 nothing, -2 - n node n. A corner without a voxel is
+// voxel `count`, whose values are 0. `number`: densities, positive where light is stopped. -> {top, tree, corner [8 cells], finest}
+function cellsOfGrid(vertices, voxels, number) {
+  const finest = 3, top = voxels.map((n) => Math.ceil((n - 1) / 8)), topCubes = top[0] * top[1] * top[2];
+  const found = new SeenCells(vertices, voxels, number), {seen} = found;
+  const eachCube = (visit) => {
+    for (let x = 0, at = 0; x < top[0]; ++x)
+      for (let y = 0; y < top[1]; ++y)
+        for (let z = 0; z < top[2]; ++z, ++at) if (found.find(x, y, z)) visit(at);
+  };
+  let cells = 0, nodes = 0;
+  const count = (rows) => rows.reduce((sum, b) => sum + onesOfByte[b], 0);
+  eachCube(() => {
+    cells += count(seen[0]);
+    nodes += count(seen[1]) + count(seen[2]) + 1;
+  });
+  const tree = new Int32Array(topCubes + 8 * nodes).fill(-1), corner = new Int32Array(8 * cells), voxel = new Int32Array(729);
+  cells = nodes = 0;
+  function putCell(x, y, z) {
+    for (let k = 0, low = 81 * x + 9 * y + z; k < 8; ++k)
+      corner[8 * cells + k] = voxel[low + 81 * (k >> 2) + 9 * (k >> 1 & 1) + (k & 1)];
+    return cells++;
+  }
+  // The node at a place of cubes 2 << level wide, of whose children one or more are seen.
+  function putNode(level, x, y, z) {
+    const node = nodes++, first = topCubes + 8 * node, across = 8 >> level;
+    for (let k = 0; k < 8; ++k) {
+      const a = 2 * x + (k >> 2), b = 2 * y + (k >> 1 & 1), c = 2 * z + (k & 1);
+      if (!(seen[level][a * across + b] >> c & 1)) continue;
+      tree[first + k] = level > 0 ? putNode(level - 1, a, b, c) : putCell(a, b, c);
+    }
     return -2 - node;
   }
-  for (const [cube, mask] of seen) {
-    const z = cube % top[2], y = Math.floor(cube / top[2]) % top[1], x = Math.floor(cube / top[2] / top[1]);
-    head[cube] = build(mask, [8 * x, 8 * y, 8 * z], 0, 0, 0, 8);
-  }
-  const all = new Int32Array(topCells + tree.length).fill(-1);
-  all.set(head);
-  all.set(tree, topCells);
-  return {vertices, top, tree: all, corner: Int32Array.from(corner), finest};
+  eachCube((at) => {
+    found.putVoxels(voxel);
+    tree[at] = putNode(2, 0, 0, 0);
+  });
+  return {top, tree, corner, finest};
 }
 
 // Columns of the spheres: {links [2R, R], place [columns], earlier}

@@ -11,12 +11,12 @@ const bytesOf = (id) => inflated(textOf(id), id);
 // Of a field whose sections' names begin with `prefix`: see decodeField. Of splats the prefix "coarse_" names the first ones,
 // which are a part of all.
 async function decodedField(header, prefix, inWorker, progress) {
-  const {resolution, basis, finest, voxels, color, splats, center, radius} = header;
+  const {resolution, basis, voxels, color, splats, center, radius} = header;
   const residuals = header.styles?.some((s) => s.residual) ?? false;
   const parts = !splats ? null : prefix ? [prefix] : ['coarse_', ''], texts = (name) => parts.map((part) => textOf(part + name));
   const text = splats ? {shape: texts('shape'), color: texts('color')}
-      : {places: textOf(prefix + (finest === null ? 'mask' : 'tree')), density: textOf(prefix + 'density'), color: textOf(prefix + 'color')};
-  const task = {header: {resolution, basis, finest, voxels, color, splats, center, radius, residuals}, text};
+      : {places: textOf(prefix + 'mask'), density: textOf(prefix + 'density'), color: textOf(prefix + 'color')};
+  const task = {header: {resolution, basis, voxels, color, splats, center, radius, residuals}, text};
   const made = inWorker && await decodedByWorker(task, progress);
   if (made) return made;
   let waited = performance.now();  // browsers make timers that follow each other last for milliseconds
@@ -66,8 +66,8 @@ const asNumbers = async (blob) => new Int32Array(await blob.arrayBuffer());
 
 function sceneOf(header, made, graphics) {
   if (header.splats) return new SplatScene(header, made, graphics);
-  const {top, finest, cells, voxels, slots, positionUnit, shift} = made;
-  const scene = {header, top, finest, cells, voxels, slots, positionUnit, shift};
+  const {top, finest, voxels, slots, positionUnit, shift} = made;
+  const scene = {header, top, finest, voxels, slots, positionUnit, shift};
   scene.unit = Math.max(...[0, 1, 2].map((a) => 2 * header.radius[a] / header.resolution[a]));
   for (const [name, kind] of [['tree', 'u4'], ['corner', 'u4'], ['base', 'i1'], ['color', 'u4']]) {
     scene[name] = graphics.texture(kind, made[name]);
