@@ -63,7 +63,7 @@ class Graphics {
     const compiling = gl.getExtension('KHR_parallel_shader_compile');
     if (compiling && !gl.getProgramParameter(program.program, compiling.COMPLETION_STATUS_KHR)) return true;
     const target = this.target(1, 1);
-    this.draw(scene, view, [{weight: 1, colors: scene.source}], null, target, {x: 0, y: 0, width: 1, height: 1}, 1, false, program);
+    this.draw(scene, view, [{weight: 1, colors: scene.source}], null, target, {x: 0, y: 0, width: 1, height: 1}, 1, program);
     gl.flush();
     target.free();
     return true;
@@ -162,7 +162,7 @@ class Graphics {
   }
 
   // `sets`: see setColors; `view`: see camera.js. Of splats, which have a draw of their own, in the order that they are in.
-  draw(scene, view, sets, map, target, strip, opacityStep, count, program = scene.draw ? null : this.marchOf(scene, sets.length)) {
+  draw(scene, view, sets, map, target, strip, opacityStep, program = scene.draw ? null : this.marchOf(scene, sets.length)) {
     if (scene.draw) return scene.draw(view, sets, map, target, strip);
     const gl = this.gl, p = check(gl, program), h = scene.header, u = (name) => p.at(name);
     p.warm = true;
@@ -186,7 +186,6 @@ class Graphics {
     gl.uniform1i(u('uFinest'), scene.finest);
     gl.uniform1i(u('uLayers'), h.spheres?.layers ?? 0);
     gl.uniform1i(u('uResolution'), h.spheres?.resolution ?? 0);
-    gl.uniform1i(u('uCount'), count ? 1 : 0);
     gl.uniform3fv(u('uCenter'), h.center);
     gl.uniform3fv(u('uRadius'), h.radius);
     gl.uniform1f(u('uUnit'), scene.unit);

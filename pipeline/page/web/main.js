@@ -164,7 +164,7 @@ async function start(page) {
     const at = Object.assign(Object.create(view), {eye: key.eye, forward: key.forward, top: key.up, half: key.half}).at(width, height);
     await full.arrange?.(at);
     const target = graphics.target(width, height);
-    graphics.draw(full, at, setsOf(key.weights, full), state.map, target, {x: 0, y: 0, width, height}, 1 / 64, false);
+    graphics.draw(full, at, setsOf(key.weights, full), state.map, target, {x: 0, y: 0, width, height}, 1 / 64);
     const pixels = graphics.read(target);
     target.free();
     await wait();
@@ -263,12 +263,12 @@ async function start(page) {
   }
   showReady();
   if (isStyled()) say('');
-  // For tests: RGBA rows from the bottom, of any view and weights; with `count` the fetches of each ray.
-  page.picture = async ({rotation, eye, lens, width, height, weights: wanted, count, opacityStep = 0}) => {
+  // For tests: RGBA rows from the bottom, of any view and weights.
+  page.picture = async ({rotation, eye, lens, width, height, weights: wanted, opacityStep = 0}) => {
     for (let i = 0; i < wanted.length; ++i) if (wanted[i] > 0) await load(i);
     await scene.arrange?.({rotation, eye, lens});
     const target = graphics.target(width, height);
-    graphics.draw(scene, {rotation, eye, lens}, setsOf(wanted), null, target, {x: 0, y: 0, width, height}, opacityStep, count);
+    graphics.draw(scene, {rotation, eye, lens}, setsOf(wanted), null, target, {x: 0, y: 0, width, height}, opacityStep);
     const pixels = graphics.read(target);
     target.free();
     return pixels;

@@ -24,7 +24,7 @@ uniform vec3 uEye;
 uniform vec4 uLens;            // focal lengths and principal point, pixels
 uniform vec2 uSize, uNdc;
 uniform ivec3 uVoxels, uTop;
-uniform int uFinest, uCount;
+uniform int uFinest;
 uniform vec3 uCenter, uRadius;
 uniform float uUnit, uNear, uStep, uOpacityStep;
 out vec4 color;
@@ -33,7 +33,6 @@ const float kOpticalDepth = 4e-4;
 const int kBits = 11;          // textures are 2048 wide
 const float kStop = 1e-4, kStopOfStep = 0.2;  // transmittance where a ray ends; of an opacity step
 const float kLeastCorner = 0.6;               // weight times opacity of the least corner, of a squared opacity step
-float fetches = 0.0;
 
 ivec2 At(int i) { return ivec2(i & 2047, i >> kBits); }
 
@@ -67,7 +66,6 @@ uvec4 TexelAt(ivec3 at, out int width) {
     shift = uFinest;
     ivec3 top = at >> shift;
     texel = texelFetch(uTree, At((top.x * uTop.y + top.y) * uTop.z + top.z), 0);
-    fetches += 1.0;
   }
   for (; texel.x >> 31 == 1u && (texel.z | texel.w) != 0u; ++depth) {
     nodes[depth] = texel;
@@ -88,7 +86,6 @@ uvec4 TexelAt(ivec3 at, out int width) {
     }
     uint earlier = Ones(word & (1u << first) - 1u) + (half_ == 0u ? 0u : Ones(texel.z));
     texel = texelFetch(uTree, At(int((texel.x & 0x7fffffffu) + earlier)), 0);
-    fetches += 1.0;
   }
   before = at;
   depthBefore = depth - 1;
@@ -117,7 +114,6 @@ vec4 Codes(uint w) {
 }
 
 vec3 ColorAt(usampler2D colors, int voxel, int set, vec3 s[9]) {
-  fetches += 1.0;
   return ColorOf(texelFetch(colors, At(voxel), 0), set, s);
 }
 
@@ -129,7 +125,6 @@ vec3 s1[9], s2[9];
 vec3 Shade(int cell, vec3 f, float opacity) {
   uvec4 corners = texelFetch(uCorner, At(cell), 0);
   int base = texelFetch(uBase, At(cell >> 10), 0).x;
-  fetches += 2.0;
   vec4 a, b;
   Weights(f, a, b);
   // With opacity steps, corners that change the pixel little are left out, and the others make up for them. The
@@ -270,12 +265,10 @@ void CompositeSpheres(vec3 eye, vec3 direction) {
     for (int k = 0; k < 4; ++k) {
       ivec2 at = ivec2((low.x + (k >> 1)) % (2 * uResolution), min(low.y + (k & 1), uResolution - 1));
       int column = texelFetch(uColumn, At(at.x * uResolution + at.y), 0).x;
-      fetches += 1.0;
       if (column < 0) continue;
       float w = (k >> 1 == 1 ? f.x : 1.0 - f.x) * ((k & 1) == 1 ? f.y : 1.0 - f.y);
       int texel = column * uLayers + i;
       uvec4 own = texelFetch(uTexel0, At(texel), 0);
-      fetches += 1.0;
       density += w * unpackHalf2x16(own.y).x;
       if (uWeight.x > 0.0) raw += uWeight.x * LayerColor(own, w, 0);
       if (uWeight.y > 0.0) raw += uWeight.y * LayerColor(texelFetch(uTexel1, At(texel), 0), w, 1);
@@ -328,5 +321,4 @@ void main() {
 #endif
   }
   color = vec4(clamp(sum + transmitted * uBackground, 0.0, 1.0), 1.0);
-  if (uCount == 1) color = vec4(mod(fetches, 256.0) / 255.0, floor(fetches / 256.0) / 255.0, 0.0, 1.0);
 }

@@ -38,7 +38,7 @@ class Painter {
       const x = Math.round(from * target.width), end = Math.round(to * target.width);
       if (end > x)
         this.graphics.draw(this.scene, view, sets, map, target,
-                           {x, y: strip.y, width: end - x, height: strip.height}, opacityStep, false);
+                           {x, y: strip.y, width: end - x, height: strip.height}, opacityStep);
     }
   }
   // One step of work; false if there is none.
