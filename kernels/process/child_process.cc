@@ -114,7 +114,8 @@ std::vector<std::string> MinimalEnvironment(const ChildOptions& options,
                                             const std::string& temporary) {
   std::vector<std::string> environment;
   if (!temporary.empty()) environment.push_back("TMPDIR=" + temporary);
-  for (const char* name : {"PATH", "HOME", "LD_LIBRARY_PATH", "CUDA_VISIBLE_DEVICES"})
+  for (const char* name : {"PATH", "HOME", "LD_LIBRARY_PATH", "CUDA_VISIBLE_DEVICES",
+                           "OMP_NUM_THREADS", "OMP_WAIT_POLICY"})
     if (const char* value = std::getenv(name))
       environment.push_back(std::string(name) + "=" + value);
   environment.push_back("LC_ALL=C.UTF-8");

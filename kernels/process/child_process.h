@@ -14,9 +14,9 @@ struct ChildOptions {
   // argv[0] is a path or a name on PATH. No shell parses anything.
   std::vector<std::string> argv;
   std::string working_folder;  // empty: that of this process
-  // Added to the child's minimal environment: PATH, HOME, LD_LIBRARY_PATH and
-  // CUDA_VISIBLE_DEVICES where set, LC_ALL=C.UTF-8, and TMPDIR, a PrivateFolder that is removed
-  // at the child's end, unless one is given here.
+  // Added to the child's minimal environment: PATH, HOME, LD_LIBRARY_PATH,
+  // CUDA_VISIBLE_DEVICES, OMP_NUM_THREADS and OMP_WAIT_POLICY where set, LC_ALL=C.UTF-8, and
+  // TMPDIR, a PrivateFolder that is removed at the child's end, unless one is given here.
   std::vector<std::pair<std::string, std::string>> environment;
   std::string temporary_parent;  // of that folder; empty: the system's temporary folder
   double wall_limit_s = 0;       // 0: none

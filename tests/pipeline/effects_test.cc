@@ -36,20 +36,18 @@ struct Reconstruction {
   }
 };
 
-const std::vector<std::string> kCoarse = {"--fit-resolutions", "24,48", "--fit-steps",
-                                          "100,150"};
-// A voxel of the forward-facing wall is as large as a pixel.
-const std::vector<std::string> kFine = {"--fit-resolutions", "32,72", "--fit-steps", "150,300"};
+const std::vector<std::string> kVoxels = {
+    "--field",           "voxels", "--config",    R"({"fit-rays": 2048})",
+    "--fit-resolutions", "24,48",  "--fit-steps", "100,150"};
+const std::vector<std::string> kSplats = {"--splat-steps", "400", "--splats", "4"};
 
-// `regrade reconstruct --reproducible` of voxels, at sizes of seconds: the gains below were
-// seen with them.
+// `regrade reconstruct --reproducible`, at sizes of seconds: the gains below were seen with
+// them.
 Reconstruction Reconstruct(const std::string& capture, const std::string& out,
                            const std::vector<std::string>& size,
                            const std::vector<std::string>& more = {}) {
   ChildOptions options;
-  options.argv = {
-      REGRADE_PROGRAM,  "reconstruct", capture,  "--out",    out,
-      "--reproducible", "--field",     "voxels", "--config", R"({"fit-rays": 2048})"};
+  options.argv = {REGRADE_PROGRAM, "reconstruct", capture, "--out", out, "--reproducible"};
   options.argv.insert(options.argv.end(), size.begin(), size.end());
   options.argv.insert(options.argv.end(), more.begin(), more.end());
   options.wall_limit_s = 300;
@@ -101,7 +99,7 @@ TEST(EffectsOff, H155_ResultsAreThoseWithoutThem) {
     of_photos.Add(testing::ReadText(folder / ("capture/images/" + FrameName(i))));
   const Camera camera = SyntheticCameras(MakeSyntheticScene(photos.scene, photos.seed),
                                          photos.views, photos.width, photos.height)[0];
-  const Reconstruction measured = Reconstruct(folder / "capture", folder / "measured", kCoarse);
+  const Reconstruction measured = Reconstruct(folder / "capture", folder / "measured", kVoxels);
   const std::string digest = DigestOf(measured.stored, camera);
   if (std::getenv("REGRADE_DIGESTS") != nullptr) {
     std::printf("kDigestPhotos[] = \"%s\"\nkDigestField[] = \"%s\"\n",
@@ -117,7 +115,7 @@ TEST(EffectsOff, H155_ResultsAreThoseWithoutThem) {
   EXPECT_EQ(measured.metrics.Find("exposure"), nullptr);
   EXPECT_EQ(digest, kDigestField);
   const Reconstruction refused = Reconstruct(
-      folder / "capture", folder / "refused", kCoarse,
+      folder / "capture", folder / "refused", kVoxels,
       {"--effects", "exposure=off,ndc=off,alpha=off,view-dependence=on,pose-refinement=off"});
   EXPECT_EQ(DigestOf(refused.stored, camera), kDigestField);
 }
@@ -131,12 +129,10 @@ TEST(EffectsOn, RefinedPosesGainDecibels) {
                 "--size",        "240x180", "--effects",        "poses"};
   synth.wall_limit_s = 120;
   ASSERT_EQ(RunChild(synth, [](const std::string&) {}).exit_status, 0);
-  const std::vector<std::string> size = {"--fit-resolutions", "24,48", "--fit-steps",
-                                         "100,200"};
   const std::string others = "exposure=off,view-dependence=on";
   const Reconstruction on =
-      Reconstruct(folder / "capture", folder / "on", size, {"--effects", others});
-  const Reconstruction off = Reconstruct(folder / "capture", folder / "off", size,
+      Reconstruct(folder / "capture", folder / "on", kSplats, {"--effects", others});
+  const Reconstruction off = Reconstruct(folder / "capture", folder / "off", kSplats,
                                          {"--effects", others + ",pose-refinement=off"});
   EXPECT_GT(on.heldout_db(), off.heldout_db() + 1.5) << on.heldout_db();
   const auto pose = [&folder](const char* name) {
@@ -181,9 +177,9 @@ TEST(EffectsOn, UndoneExposureGainsThreeDecibels) {
   SyntheticPhotos photos = Wall();
   photos.effects.exposure = true;
   WriteSyntheticWorkspace(photos, folder / "capture");
-  const Reconstruction on = Reconstruct(folder / "capture", folder / "on", kFine,
+  const Reconstruction on = Reconstruct(folder / "capture", folder / "on", kSplats,
                                         {"--effects", "view-dependence=on"});
-  const Reconstruction off = Reconstruct(folder / "capture", folder / "off", kFine,
+  const Reconstruction off = Reconstruct(folder / "capture", folder / "off", kSplats,
                                          {"--effects", "exposure=off,view-dependence=on"});
   EXPECT_TRUE(on.effect("exposure").At("on").AsBool());
   EXPECT_FALSE(off.effect("exposure").At("on").AsBool());
@@ -197,7 +193,7 @@ TEST(EffectsOn, BentLensesAreAsGoodAsAPinhole) {
   TemporaryFolder folder;
   WriteSyntheticWorkspace(Table(), folder / "pinhole");
   const Reconstruction plain =
-      Reconstruct(folder / "pinhole", folder / "plain", kFine, kTrialless);
+      Reconstruct(folder / "pinhole", folder / "plain", kSplats, kTrialless);
   EXPECT_FALSE(plain.effect("distortion").At("on").AsBool());
   for (const bool fisheye : {false, true}) {
     const std::string name = fisheye ? "fisheye" : "barrel";
@@ -205,7 +201,7 @@ TEST(EffectsOn, BentLensesAreAsGoodAsAPinhole) {
     (fisheye ? photos.effects.fisheye : photos.effects.barrel) = true;
     WriteSyntheticWorkspace(photos, folder / name);
     const Reconstruction bent =
-        Reconstruct(folder / name, folder / (name + "_out"), kFine, kTrialless);
+        Reconstruct(folder / name, folder / (name + "_out"), kSplats, kTrialless);
     EXPECT_TRUE(bent.effect("distortion").At("on").AsBool());
     EXPECT_GT(bent.heldout_db(), plain.heldout_db() - 0.5) << name;
   }

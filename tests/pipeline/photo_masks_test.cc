@@ -62,20 +62,9 @@ void SynthWithAThing(const TemporaryFolder& folder) {
 
 void Reconstruct(const std::string& capture, const std::string& out, const std::string& steps,
                  std::vector<std::string> more) {
-  std::vector<std::string> words = {"reconstruct",
-                                    capture,
-                                    "--out",
-                                    out,
-                                    "--tracks",
-                                    "given",
-                                    "--field",
-                                    "voxels",
-                                    "--fit-resolutions",
-                                    "24,48",
-                                    "--fit-steps",
-                                    steps,
-                                    "--config",
-                                    R"({"fit-rays": 2048})"};
+  std::vector<std::string> words = {"reconstruct",   capture, "--out",    out,
+                                    "--tracks",      "given", "--splats", "4",
+                                    "--splat-steps", steps};
   words.insert(words.end(), more.begin(), more.end());
   Said(words);
 }
@@ -98,9 +87,8 @@ TEST(PhotoMasks, MaskedPixelsAreNeitherFittedNorMeasured) {
   REGRADE_AT_NIGHT();
   const TemporaryFolder folder;
   SynthWithAThing(folder);
-  Reconstruct(folder / "s/truth", folder / "with", "100,200",
-              {"--photo-masks", folder / "masks"});
-  Reconstruct(folder / "clean/truth", folder / "clean_out", "100,200", {});
+  Reconstruct(folder / "s/truth", folder / "with", "400", {"--photo-masks", folder / "masks"});
+  Reconstruct(folder / "clean/truth", folder / "clean_out", "400", {});
   // A square of a quarter of the picture before fitted and held-out photos alike costs many
   // decibels where it is fitted or measured.
   EXPECT_GT(HeldOutPsnr(folder / "with"), HeldOutPsnr(folder / "clean_out") - 2);
@@ -131,7 +119,7 @@ TEST(PhotoMasks, MaskedPixelsAreNeitherFittedNorMeasured) {
 TEST(PhotoMasks, LaterStagesAndRunsUseTheStagedMasks) {
   const TemporaryFolder folder;
   SynthWithAThing(folder);
-  Reconstruct(folder / "s/truth", folder / "out", "50,50", {"--photo-masks", folder / "masks"});
+  Reconstruct(folder / "s/truth", folder / "out", "60", {"--photo-masks", folder / "masks"});
   fs::remove_all(folder / "masks");
   // Whatever a 2D method made of the masked parts, the network that learns of it is the same,
   // and so are the figures against its pictures.

@@ -16,6 +16,7 @@
 #include "pipeline/stages/styled_field.h"
 #include "pipeline/workspace/style_folders.h"
 #include "tests/support/expect_error.h"
+#include "tests/support/nightly.h"
 #include "tests/support/source_dir.h"
 #include "tests/support/spawn.h"
 #include "tests/support/temporary_folder.h"
@@ -199,6 +200,7 @@ bool KillWithinStyles(const TemporaryFolder& folder, const std::vector<std::stri
 
 // Three styles on one run, killed within the second and the third, and gone on.
 TEST(Styles, KilledInTheMidstAndGoneOnIsByteIdentical) {
+  REGRADE_AT_NIGHT();  // by day, scripts kill runs of one style
   const TemporaryFolder folder;
   Synth(folder);
   const std::vector<std::string> styles{"--style",       Asset("sunset"), "--style",
