@@ -13,8 +13,9 @@ namespace regrade {
 
 struct RenderedView {
   Image color;  // [H, W, 3] sRGB, clipped to [0, 1]
-  Image depth;  // [H, W, 1]: sum w z / sum w, z along the optical axis in world units; 0 where
-                // sum w < 0.5
+  // [H, W, 1]: sum w z / sum w, of splats the median of z, along the optical axis in world
+  // units; 0 where sum w < 0.5.
+  Image depth;
   Image transmittance;  // [H, W, 1]
 };
 

@@ -34,8 +34,9 @@ std::unique_ptr<RayWeigher> MakeRayWeigher(const Geometry& geometry, float near_
                                            const MarchOptions& march, float min_weight = 0,
                                            int64_t kept_bytes = 0);
 
-// [rays]: depth along the camera's optical axis of what each ray meets, 0 where that is less
-// than half of its light. `weigher`: of the field, with the least weight 0.
+// [rays]: depth along the camera's optical axis of what each ray meets (of splats the median),
+// 0 where that is less than half of its light. `weigher`: of the field, with the least weight
+// 0.
 std::vector<double> RayDepths(const RadianceField& field, const ViewRays& rays,
                               const MarchOptions& march, RayWeigher* weigher);
 

@@ -42,20 +42,19 @@ struct PlaceBox {
   }
 };
 
-// Z over 1 - T of EQ(splat-composite).
+// The median depth, see EQ(splat-composite).
 double SplatDepth(const SplatGeometry& splats, const Camera& camera, const RayWeights& weights,
                   int64_t ray) {
-  const double seen = 1 - double{weights.transmittance[static_cast<size_t>(ray)]};
-  if (!(seen >= 0.5)) return 0;
-  double sum = 0;
+  double seen = 0;
   for (int64_t i = weights.first[static_cast<size_t>(ray)];
        i < weights.first[static_cast<size_t>(ray) + 1]; ++i) {
     const WeightedSample& sample = weights.samples[static_cast<size_t>(i)];
+    seen += double{sample.weight};
+    if (seen < 0.5) continue;
     const float* const mean = splats.mean.data() + 3 * int64_t{sample.vertex};
-    sum += double{sample.weight} *
-           (camera.camera_from_world * Vec3f{mean[0], mean[1], mean[2]}.Cast<double>()).z;
+    return (camera.camera_from_world * Vec3f{mean[0], mean[1], mean[2]}.Cast<double>()).z;
   }
-  return sum / seen;
+  return 0;
 }
 
 }  // namespace

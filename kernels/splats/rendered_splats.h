@@ -10,13 +10,9 @@
 
 namespace regrade {
 
-// Colours clipped; expected depths, 0 where less than half of the light is from splats.
+// Colours clipped; median depths, 0 where less than half of the light is from splats.
 inline RenderedView RenderedSplats(SplatPicture<float> picture) {
   for (float& value : picture.color) value = std::clamp(value, 0.0f, 1.0f);
-  for (size_t i = 0; i < picture.depth.size(); ++i) {
-    const float weight = 1 - picture.transmittance[i];
-    picture.depth[i] = weight < 0.5f ? 0.0f : picture.depth[i] / weight;
-  }
   const auto image = [&picture](int channels, std::vector<float>* values) {
     Image made;
     made.width = picture.width, made.height = picture.height, made.channels = channels;
@@ -24,7 +20,7 @@ inline RenderedView RenderedSplats(SplatPicture<float> picture) {
     return made;
   };
   return {.color = image(3, &picture.color),
-          .depth = image(1, &picture.depth),
+          .depth = image(1, &picture.median_depth),
           .transmittance = image(1, &picture.transmittance)};
 }
 

@@ -38,7 +38,7 @@ void ExportPoints(const ExportOptions& options, const std::string& folder,
       SurfacePoints(stored.field, ViewsOf(folder, stored, kViews), kResolution);
   const std::string to = options.out + "/" + name + ".ply";
   WritePly(to, points, stored.field_from_world,
-           "approximate: points at the expected depth of rays, colours as photos saw them");
+           "approximate: points at the depth of rays, colours as photos saw them");
   console->Info(
       Concat("wrote ", to, ": ", Counted(std::ssize(points), "point"), ", approximate"));
 }

@@ -16,7 +16,7 @@ struct SurfacePoint {
   std::array<uint8_t, 3> color;  // sRGB
 };
 
-// What the pixels of `cameras`, in the field's frame, see at the expected depth of their rays.
+// What the pixels of `cameras`, in the field's frame, see at the depth of their rays.
 // A pixel counts if little light passes behind it and its neighbours' depths are near its own,
 // so that edges leave no points in the air. One point in each cube of 1 / `resolution` of the
 // box's longest side. Approximate: a field has no surface, and its colours change with
