@@ -41,8 +41,7 @@ const std::vector<std::string> kVoxels = {
     "--fit-resolutions", "24,48",  "--fit-steps", "100,150"};
 const std::vector<std::string> kSplats = {"--splat-steps", "400", "--splats", "4"};
 
-// `regrade reconstruct --reproducible`, at sizes of seconds: the gains below were seen with
-// them.
+// `regrade reconstruct --reproducible`, at sizes of seconds.
 Reconstruction Reconstruct(const std::string& capture, const std::string& out,
                            const std::vector<std::string>& size,
                            const std::vector<std::string>& more = {}) {
@@ -120,8 +119,7 @@ TEST(EffectsOff, H155_ResultsAreThoseWithoutThem) {
   EXPECT_EQ(DigestOf(refused.stored, camera), kDigestField);
 }
 
-// Poses 0.3 degrees and 0.5 % of the spread off, tracks exact to half a pixel. 2.4 dB were seen
-// at this size; at 320x240 with the draft's grids 9.9 dB (21.1 to 31.0).
+// Poses 0.3 degrees and 0.5 % of the spread off, tracks exact to half a pixel.
 TEST(EffectsOn, RefinedPosesGainDecibels) {
   TemporaryFolder folder;
   ChildOptions synth;
@@ -171,7 +169,7 @@ SyntheticPhotos Table() {
 }
 
 // Photos whose exposure drifts by +-30 %. Held-out photos are compared with renders given the
-// gain that those photos have by their own tracks. 5.3 dB were seen.
+// gain that those photos have by their own tracks.
 TEST(EffectsOn, UndoneExposureGainsThreeDecibels) {
   TemporaryFolder folder;
   SyntheticPhotos photos = Wall();
