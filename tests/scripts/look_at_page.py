@@ -5,8 +5,8 @@
 
 FOLDER is write_scene_pages's: pages NAME.html with views and pixels in NAME.json. Checked of each page: its pictures, its style's bound,
 nothing asked of the network, nothing on the console (a violation of the page's policy is an error there), no scrolling
-sideways at the sizes of a phone and a desktop, where words and the first view are in the window, names; of some, that it opens styled, that a coarse picture comes first and that workers aren't needed; of the
-splats', that keys and the slider change the picture. Everything
+sideways at the sizes of a phone and a desktop, where words and the first view are in the window, names; of some, that it opens styled, that a coarse picture comes first and that workers aren't needed; of that
+of splats, that keys and the slider change the picture. Everything
 that keys can do is walk_page.py's, long use and damage strain_page.py's.
 --shots keeps pictures of the pages. Exit status 1 if anything is wrong, 77 if there is no Chromium.
 """

@@ -148,7 +148,7 @@ TEST(SplatWeights, DepthsAreThePictures) {
     others += !(std::abs(depths[i] - picture.pixels[i]) < 1e-4);
     seen += depths[i] > 0;
   }
-  EXPECT_LE(others, 2);
+  EXPECT_LE(others, std::ssize(depths) / 1000);  // as FastSplats.RendersAsThePlainPicture
   EXPECT_GT(seen, 400);
   EXPECT_LT(seen, 1600);
 }
