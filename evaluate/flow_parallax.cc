@@ -12,7 +12,7 @@ namespace {
 
 constexpr int kPointsAcross = 24;  // of the grid, along the longer side
 constexpr size_t kLeastPoints = 16;
-constexpr int kIterations = 12;
+constexpr int kParallaxIterations = 12;
 // Distances below, in pixels, count alike, and a ridge keeps the normal equations solvable.
 constexpr double kLeastDistance = 0.02, kRidge = 1e-6;
 
@@ -49,7 +49,7 @@ std::vector<Point> GridPoints(const FlowField& flow) {
 // Iteratively reweighted least squares.
 Coefficients FitTurn(const std::vector<Point>& points) {
   Coefficients turn = Coefficients::Zero();
-  for (int iteration = 0; iteration < kIterations; ++iteration) {
+  for (int iteration = 0; iteration < kParallaxIterations; ++iteration) {
     Eigen::Matrix<double, 8, 8> normal = kRidge * Eigen::Matrix<double, 8, 8>::Identity();
     Coefficients right = Coefficients::Zero();
     for (const Point& point : points) {

@@ -17,7 +17,7 @@ namespace fs = std::filesystem;
 constexpr int kDeepest = 3;           // folders below PHOTOS
 constexpr size_t kMostFolders = 500;  // that are looked into
 
-std::vector<fs::path> FoldersIn(const fs::path& folder) {
+std::vector<fs::path> InnerFolders(const fs::path& folder) {
   std::vector<fs::path> folders;
   std::error_code error;  // a folder that cannot be listed holds no model
   for (fs::directory_iterator it(folder, error), end; !error && it != end; it.increment(error))
@@ -34,7 +34,7 @@ std::vector<fs::path> ModelsIn(const std::vector<fs::path>& folders) {
   std::vector<fs::path> models;
   for (const fs::path& folder : folders) {
     if (HoldsColmapModel(folder)) models.push_back(folder);
-    for (const fs::path& numbered : FoldersIn(folder))
+    for (const fs::path& numbered : InnerFolders(folder))
       if (HoldsColmapModel(numbered)) models.push_back(numbered);
   }
   return models;
@@ -85,7 +85,7 @@ fs::path ColmapModelElsewhere(const fs::path& root) {
     const auto [folder, depth] = folders[i];
     if (HoldsColmapModel(folder)) return folder;
     if (depth == kDeepest) continue;
-    for (const fs::path& inner : FoldersIn(folder))
+    for (const fs::path& inner : InnerFolders(folder))
       if (!inner.filename().string().starts_with('.') && !IsRunFolder(inner.string()))
         folders.emplace_back(inner, depth + 1);
   }

@@ -19,7 +19,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-std::string StemOf(const std::string& file) { return fs::path(file).stem().string(); }
+std::string PathStem(const std::string& file) { return fs::path(file).stem().string(); }
 
 void AddPinhole(const Camera& camera, const std::string& name, ColmapModel* model) {
   const uint32_t id = static_cast<uint32_t>(model->images.size()) + 1;
@@ -92,7 +92,7 @@ ColmapModel ModelFromNsvf(const CaptureSource& source, const std::vector<StagedP
   const Camera intrinsics = ReadNsvfIntrinsics(source.intrinsics);
   ColmapModel model;
   for (const StagedPhoto& photo : photos) {
-    const fs::path pose = fs::path(source.poses) / (StemOf(photo.file) + ".txt");
+    const fs::path pose = fs::path(source.poses) / (PathStem(photo.file) + ".txt");
     if (!fs::is_regular_file(pose)) continue;  // a photo without a pose
     Camera camera = intrinsics;
     camera.camera_from_world = ReadNsvfPose(pose.string());
@@ -104,11 +104,11 @@ ColmapModel ModelFromNsvf(const CaptureSource& source, const std::vector<StagedP
   std::set<std::string> pictures;
   std::error_code error;
   for (const auto& entry : fs::directory_iterator(source.photos, error))
-    pictures.insert(StemOf(entry.path().filename().string()));
+    pictures.insert(PathStem(entry.path().filename().string()));
   for (const auto& entry : fs::directory_iterator(source.poses, error))
     if (const fs::path name = entry.path().filename();
-        name.extension() == ".txt" && !pictures.contains(StemOf(name.string())))
-      missing->push_back(StemOf(name.string()));
+        name.extension() == ".txt" && !pictures.contains(PathStem(name.string())))
+      missing->push_back(PathStem(name.string()));
   return model;
 }
 
@@ -117,7 +117,7 @@ ColmapModel ModelFromPolycam(const CaptureSource& source,
                              const std::vector<StagedPhoto>& photos) {
   ColmapModel model;
   for (const StagedPhoto& photo : photos) {
-    const fs::path camera = fs::path(source.poses) / (StemOf(photo.file) + ".json");
+    const fs::path camera = fs::path(source.poses) / (PathStem(photo.file) + ".json");
     if (fs::is_regular_file(camera))
       AddPinhole(ReadPolycamCamera(camera.string()), photo.name, &model);
   }
@@ -133,7 +133,7 @@ ColmapModel ModelFromDtu(const CaptureSource& source, const std::vector<StagedPh
   std::map<int, Camera> cameras = ReadDtuCameras(source.poses);
   ColmapModel model;
   for (const StagedPhoto& photo : photos) {
-    const std::string stem = StemOf(photo.file);
+    const std::string stem = PathStem(photo.file);
     int number = -1;
     const auto [end, error] = std::from_chars(stem.data(), stem.data() + stem.size(), number);
     if (error != std::errc() || end != stem.data() + stem.size()) continue;

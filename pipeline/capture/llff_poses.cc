@@ -14,8 +14,8 @@ namespace {
 
 constexpr int kColumns = 17;
 constexpr int kMaxLlffSide = 1 << 16;  // pixels
-constexpr uint64_t kMaxBytes = 16 << 20;
-constexpr double kRigidTolerance = 1e-2;
+constexpr uint64_t kMostLlffBytes = 16 << 20;
+constexpr double kLlffRigidTolerance = 1e-2;
 
 [[noreturn]] void Refuse(const std::string& path, size_t row, const std::string& what) {
   throw InputError(Concat("pose ", row, ": ", what), path,
@@ -43,7 +43,7 @@ Camera CameraOf(const std::string& path, size_t row, const double* v) {
   const double off =
       std::max({std::abs(Norm(axis[0]) - 1), std::abs(Norm(axis[2]) - 1),
                 std::abs(Dot(axis[0], axis[2])), Norm(Cross(axis[2], axis[0]) - axis[1])});
-  if (!(off < kRigidTolerance)) Refuse(path, row, "the matrix is not a rotation");
+  if (!(off < kLlffRigidTolerance)) Refuse(path, row, "the matrix is not a rotation");
   const Vec3d forward = Normalized(axis[2]);
   const Vec3d right = Normalized(axis[0] - forward * Dot(axis[0], forward));
   Mat3d& rotation = camera.camera_from_world.rotation;
@@ -59,7 +59,7 @@ Camera CameraOf(const std::string& path, size_t row, const double* v) {
 }  // namespace
 
 LlffPoses ReadPosesBounds(const std::string& path) {
-  const std::string bytes = ReadWholeFile(path, kMaxBytes);
+  const std::string bytes = ReadWholeFile(path, kMostLlffBytes);
   const NpyHeader header = ParseNpyHeader(bytes, path);
   if (header.type != ArrayType::kF64 || header.shape.size() != 2 ||
       header.shape[1] != kColumns || header.shape[0] < 1 ||

@@ -10,7 +10,7 @@
 namespace regrade {
 namespace {
 
-constexpr double kMostSkew = 1e-3;   // of the focal length
+constexpr double kMostNsvfSkew = 1e-3;   // of the focal length
 constexpr double kMostPixels = 1e9;  // of a focal length or a place
 
 using Lines = std::vector<std::vector<double>>;
@@ -43,7 +43,7 @@ Camera ReadNsvfIntrinsics(const std::string& path) {
     camera.fy = k[columns + 1];
     camera.cx = k[2];
     camera.cy = k[columns + 2];
-    if (!(std::abs(k[1]) <= kMostSkew * std::abs(camera.fx)))
+    if (!(std::abs(k[1]) <= kMostNsvfSkew * std::abs(camera.fx)))
       throw InputError("its pixels are skewed", path, "undistort the pictures first");
   } else if (lines[0].size() >= 3) {
     camera.fx = camera.fy = lines[0][0];

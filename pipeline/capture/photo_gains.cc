@@ -11,7 +11,7 @@
 namespace regrade {
 namespace {
 
-constexpr int64_t kSchema = 1;
+constexpr int64_t kGainsSchema = 1;
 constexpr double kNearlyClipped = 0.98;  // encoded
 
 JsonValue Triple(const Vec3d& v) { return JsonValue::Array{v.x, v.y, v.z}; }
@@ -77,7 +77,7 @@ void WriteGains(const std::string& poses, const Capture& capture,
                                      {"log_error", Triple(photo.log_error)},
                                      {"observations", photo.observations}});
   }
-  WriteJsonFile(path, JsonValue::Object{{"schema", kSchema}, {"photos", std::move(rows)}});
+  WriteJsonFile(path, JsonValue::Object{{"schema", kGainsSchema}, {"photos", std::move(rows)}});
 }
 
 JsonValue StoredGainRows(const std::string& poses) {
@@ -85,8 +85,8 @@ JsonValue StoredGainRows(const std::string& poses) {
   if (!std::filesystem::exists(path)) return JsonValue();
   const JsonValue file = ReadJsonFile(path);
   const JsonValue* const schema = file.IsObject() ? file.Find("schema") : nullptr;
-  if (schema == nullptr || !(*schema == JsonValue(kSchema)))
-    throw InputError("is not of schema " + std::to_string(kSchema), path,
+  if (schema == nullptr || !(*schema == JsonValue(kGainsSchema)))
+    throw InputError("is not of schema " + std::to_string(kGainsSchema), path,
                      "use --restart-from reconstruct");
   return file.At("photos");
 }

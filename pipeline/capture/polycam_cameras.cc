@@ -12,7 +12,7 @@ namespace regrade {
 namespace {
 
 constexpr double kMaxPolycamSide = 1 << 16;  // pixels
-constexpr uint64_t kMaxBytes = 1 << 20;
+constexpr uint64_t kMostPolycamBytes = 1 << 20;
 
 double NumberOf(const std::string& path, const JsonValue& top, const std::string& key) {
   const JsonValue* value = top.Find(key);
@@ -31,7 +31,7 @@ int SideOf(const std::string& path, const JsonValue& top, const std::string& key
 }  // namespace
 
 Camera ReadPolycamCamera(const std::string& path) {
-  const JsonValue top = ReadJsonFile(path, kMaxBytes);
+  const JsonValue top = ReadJsonFile(path, kMostPolycamBytes);
   Camera camera;
   camera.width = SideOf(path, top, "width");
   camera.height = SideOf(path, top, "height");

@@ -34,7 +34,7 @@ using namespace ffmpeg;  // NOLINT: owners of its objects
 constexpr char kContainers[] = "mov,mp4,m4a,3gp,3g2,mj2,matroska,webm,avi,mpegts,mpeg";
 // Above, decoding every frame of a long film takes longer than what it adds.
 constexpr int64_t kManyFrames = 1800;
-constexpr int kMostThreads = 8;  // each holds a frame
+constexpr int kMostFilmThreads = 8;  // each holds a frame
 // A frame needs a few packets at most; more do not lead to any.
 constexpr int64_t kTriesPerFrame = 16;
 
@@ -132,7 +132,7 @@ struct FilmDecoder::State {
     decoder->max_pixels = limits.max_pixels;
     decoder->err_recognition = AV_EF_EXPLODE;  // no frames with invented parts
     decoder->thread_count =
-        std::clamp(static_cast<int>(std::thread::hardware_concurrency()), 1, kMostThreads);
+        std::clamp(static_cast<int>(std::thread::hardware_concurrency()), 1, kMostFilmThreads);
     if (info.frames > kManyFrames && !limits.every_frame)
       decoder->skip_frame = AVDISCARD_NONREF;
     CheckOpen(avcodec_open2(decoder.get(), codec, nullptr), "its codec");

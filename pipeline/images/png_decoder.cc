@@ -17,15 +17,15 @@ namespace {
 
 // libpng with its callbacks. On an error libpng leaves the methods that call it by longjmp:
 // they hold no object with a destructor, and return false.
-class Decoder {
+class PngRows {
  public:
-  explicit Decoder(std::string_view bytes) : left_(bytes) {
+  explicit PngRows(std::string_view bytes) : left_(bytes) {
     png_ = png_create_read_struct(PNG_LIBPNG_VER_STRING, this, OnError, OnRemark);
     if (png_ != nullptr) info_ = png_create_info_struct(png_);
   }
-  ~Decoder() { png_destroy_read_struct(&png_, &info_, nullptr); }
-  Decoder(const Decoder&) = delete;
-  Decoder& operator=(const Decoder&) = delete;
+  ~PngRows() { png_destroy_read_struct(&png_, &info_, nullptr); }
+  PngRows(const PngRows&) = delete;
+  PngRows& operator=(const PngRows&) = delete;
 
   // Everything becomes 8 or 16 bits of grey or RGB, with alpha where there is some.
   bool ReadHeader() {
@@ -77,18 +77,18 @@ class Decoder {
   const char* first_remark() const { return first_remark_; }
 
  private:
-  static Decoder& Of(png_structp png) { return *static_cast<Decoder*>(png_get_error_ptr(png)); }
+  static PngRows& Of(png_structp png) { return *static_cast<PngRows*>(png_get_error_ptr(png)); }
   [[noreturn]] static void OnError(png_structp png, png_const_charp text) {
     std::snprintf(Of(png).failure_, sizeof failure_, "%s", text);
     png_longjmp(png, 1);
   }
   static void OnRemark(png_structp png, png_const_charp text) {
-    Decoder& decoder = Of(png);
+    PngRows& decoder = Of(png);
     if (decoder.remarks_++ == 0)
       std::snprintf(decoder.first_remark_, sizeof first_remark_, "%s", text);
   }
   static void OnRead(png_structp png, png_bytep to, size_t size) {
-    Decoder& decoder = *static_cast<Decoder*>(png_get_io_ptr(png));
+    PngRows& decoder = *static_cast<PngRows*>(png_get_io_ptr(png));
     if (size > decoder.left_.size()) png_error(png, "truncated: the file ends too early");
     std::memcpy(to, decoder.left_.data(), size);
     decoder.left_.remove_prefix(size);
@@ -134,7 +134,7 @@ std::string_view ChunkOf(std::string_view bytes, std::string_view name) {
 
 PngPicture DecodePng(std::string_view bytes, const std::string& where,
                      const PngSizeCheck& check) {
-  Decoder png(bytes);
+  PngRows png(bytes);
   const auto refuse = [&] {
     throw InputError(std::string("cannot read this PNG: ") + png.failure(), where,
                      "copy the file again from its source");

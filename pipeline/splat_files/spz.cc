@@ -22,10 +22,10 @@ constexpr uint8_t kAntialiased = 1, kExtensions = 2;
 constexpr uint32_t kAxes = 0xADBE0003;
 // A file whose splats all differ is packed 2 to 5 times; beyond this it is no scene.
 constexpr uint64_t kMostRatio = 100, kAlwaysUnpacked = 1 << 16;
-constexpr char kDamaged[] = "the file is incomplete or damaged: copy or download it again";
+constexpr char kDamagedSpz[] = "the file is incomplete or damaged: copy or download it again";
 
 [[noreturn]] void Refuse(const std::string& why, const std::string& where,
-                         const std::string& hint = kDamaged) {
+                         const std::string& hint = kDamagedSpz) {
   throw InputError("SPZ: " + why, where, hint);
 }
 

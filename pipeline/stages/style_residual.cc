@@ -18,14 +18,14 @@
 namespace regrade {
 namespace {
 
-constexpr int64_t kMostRays = 300000;  // of all views: 0.4 GB
+constexpr int64_t kMostResidualRays = 300000;  // of all views: 0.4 GB
 // Seen from all sides a residual needs a lower cost than from one.
 constexpr double kCostOfViews = 0.001;
 constexpr int kScalings =
     3;  // fits with a layer, each with the scale of the last one, see EQ(view-scale)
 constexpr int kTurnsAgain = 4;  // of these fits but the first: they begin where the last ended
 // Below this, root mean square, a view lacks nothing that can be seen.
-constexpr double kNothing = 0.5 / 255;
+constexpr double kNoResidual = 0.5 / 255;
 
 double RootMeanSquare(const Image& image) {
   double sum = 0, count = 0;
@@ -68,7 +68,7 @@ class ResidualFit {
     RadianceField styled = styled_.field;
     if (!so_far.color.empty()) AddResidual(so_far, &styled.appearance);
     const FieldRenderer of_styled(styled, backend_);
-    const int64_t most = kMostRays / std::max<int64_t>(1, std::ssize(indices));
+    const int64_t most = kMostResidualRays / std::max<int64_t>(1, std::ssize(indices));
     ResidualRays rays;
     ProgressParts parts(progress, 2);
     const ProgressFunction rendering = parts.Next(1);
@@ -84,7 +84,7 @@ class ResidualFit {
         missing.pixels[k] =
             std::clamp(missing.pixels[k], 0.0f, 1.0f) - pair.other_color.pixels[k];
       views_.LeaveOutMasked(i, &missing);
-      if (start.empty() && RootMeanSquare(missing) < kNothing) continue;
+      if (start.empty() && RootMeanSquare(missing) < kNoResidual) continue;
       AddResidualRays(source_.field, camera, missing, most,
                       context_->settings.run.seed + static_cast<uint64_t>(i), &rays);
     }

@@ -23,7 +23,7 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr int kFeatures = 768;   // per photo: give hundreds of tracks
-constexpr int kSmallSide = 900;  // pixels; upsamples smaller photos, as in the strategies
+constexpr int kSmallTrackSide = 900;  // pixels; upsamples smaller photos, as in the strategies
 // COLMAP's own limit of the reprojection error, pixels ...
 constexpr double kStrictLimit = 4;
 // ... and ours for inaccurate poses, as a fraction of a photo's longer side.
@@ -87,7 +87,7 @@ class TrackFinder {
     colmap_.emplace(options_.colmap, logs, options_.colmap_gpu);
     result_.colmap_version = colmap_->version();
     PoseStrategy strategy{.max_features = kFeatures};
-    strategy.first_octave = LongerSide() < kSmallSide ? -1 : 0;
+    strategy.first_octave = LongerSide() < kSmallTrackSide ? -1 : 0;
     const PoseWeights weights = EstimateWeights(strategy, photos_, options_.image_size);
     planned_ = weights.extract + weights.match + weights.refine;
     Extract(strategy, weights.extract);

@@ -12,7 +12,7 @@
 namespace regrade {
 namespace {
 
-constexpr uint64_t kSeed = 0x72;
+constexpr uint64_t kMatchSeed = 0x72;
 constexpr int64_t kMostRows = 20000;  // of all photos: a mixture needs no more
 
 FeatureRows Sample(const std::vector<PictureFeatures>& pictures) {
@@ -87,9 +87,9 @@ RegionMatch MatchRegions(const std::vector<PictureFeatures>& photos,
   REGRADE_CHECK(!photos.empty() && styles.size() >= 2);
   std::vector<RegionMixture> of_styles;
   for (const PictureFeatures& style : styles)
-    of_styles.push_back(FitRegions(Sample({style}), kStyleRegions, kSeed));
+    of_styles.push_back(FitRegions(Sample({style}), kStyleRegions, kMatchSeed));
   RegionMatch match;
-  match.scene = FitRegions(Sample(photos), kSceneRegions, kSeed);
+  match.scene = FitRegions(Sample(photos), kSceneRegions, kMatchSeed);
   match.weight_of_style.resize(styles.size());
   for (const RegionPart& part : match.scene) {
     constexpr double kFar = std::numeric_limits<double>::infinity();

@@ -14,7 +14,7 @@ using Matrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowM
 using Vector = Eigen::VectorXd;
 
 constexpr int kMostRegionIterations = 60;
-constexpr double kLeastGain = 1e-4;  // nats a row
+constexpr double kLeastRegionGain = 1e-4;  // nats a row
 
 Eigen::Map<const Matrix> CovarianceOf(const RegionPart& part) {
   const auto n = static_cast<Eigen::Index>(part.mean.size());
@@ -125,7 +125,7 @@ RegionMixture FitRegions(const FeatureRows& rows, int parts, uint64_t seed) {
   for (int i = 0; i < kMostRegionIterations; ++i) {
     mixture = Maximised(x, shares);
     const double then = Expect(mixture, x, &shares);
-    if (!(then - likelihood >= kLeastGain)) break;
+    if (!(then - likelihood >= kLeastRegionGain)) break;
     likelihood = then;
   }
   return mixture;

@@ -14,7 +14,7 @@ namespace regrade {
 namespace {
 
 constexpr WhiteningRule kRule{1, 1e-5};
-constexpr int kMultiple = 8;  // three halvings
+constexpr int kWct2Multiple = 8;  // three halvings
 constexpr int kLevels = 4;
 constexpr std::array kBands = {"lh", "hl", "hh"};
 
@@ -29,13 +29,13 @@ class Wct2 : public ViewStylizer {
       decoders_.emplace_back(Numbered(folder, Prefix(cat5) + "decoder", level));
     }
     // Files that do not fit each other are found before a large picture is begun.
-    const Image trial = TrialPicture(4 * kMultiple, 3 * kMultiple);
+    const Image trial = TrialPicture(4 * kWct2Multiple, 3 * kWct2Multiple);
     Restyle(MapOf(trial), [this](const std::string& place, FeatureMap* x) {
       style_[place] = MeasureFeatures(*x, 1);
     });
     Restyled(trial);
     style_.clear();
-    const FeatureMap picture = Padded(MapOf(Working(Colors(style), max_side_, 1)), kMultiple);
+    const FeatureMap picture = Padded(MapOf(Working(Colors(style), max_side_, 1)), kWct2Multiple);
     Restyle(picture, [this](const std::string& place, FeatureMap* x) {
       style_[place] = MeasureFeatures(*x, 1);
     });
@@ -58,9 +58,9 @@ class Wct2 : public ViewStylizer {
   Image Restyled(const Image& photo) const {
     const FeatureMap map = MapOf(photo);
     return ClippedImageOf(Cropped(
-        Restyle(Padded(map, kMultiple),
+        Restyle(Padded(map, kWct2Multiple),
                 [this](const std::string& place, FeatureMap* x) { Transform(place, x); }),
-        photo.width, photo.height, kMultiple - 1, decoders_[0].path()));
+        photo.width, photo.height, kWct2Multiple - 1, decoders_[0].path()));
   }
 
   void Transform(const std::string& place, FeatureMap* x) const {
