@@ -74,6 +74,15 @@ function(regrade_library name)
   endif()
 endfunction()
 
+# regrade_module(name user SOURCES...): regrade_*.so, which library `user` loads when it needs it (program_module.h).
+function(regrade_module name user)
+  add_library(${name} MODULE ${ARGN})
+  target_link_libraries(${name} PRIVATE regrade_flags)
+  set_target_properties(${name} PROPERTIES PREFIX "" LIBRARY_OUTPUT_DIRECTORY "${PROJECT_BINARY_DIR}/modules")
+  add_dependencies(${user} ${name})
+  install(TARGETS ${name} DESTINATION ${CMAKE_INSTALL_LIBDIR}/regrade)
+endfunction()
+
 # regrade_instruction_sets(name stem): STEM_avx2.cc and STEM_avx512.cc of library `name` get the flags of their
 # instruction set, and they alone: a global -march would change Eigen's memory layout between us and Debian's Ceres.
 function(regrade_instruction_sets name stem)
@@ -89,7 +98,7 @@ endfunction()
 set(regrade_test_options $<$<CONFIG:Release>:-O1>)
 
 # regrade_test(name SOURCES... LINK libs... [PARTS n] [COST seconds]): one GoogleTest program, one CTest test: to start a
-# program that links picture formats takes longer than most cases. With PARTS n, for long programs, it is n tests, NAME_1 to
+# program takes longer than most cases. With PARTS n, for long programs, it is n tests, NAME_1 to
 # NAME_n, which share the cases; the costly begin first.
 function(regrade_test name)
   cmake_parse_arguments(ARG "" "COST;PARTS" "SOURCES;LINK" ${ARGN})

@@ -3,11 +3,12 @@
 #include <cstring>
 #include <opencv2/imgproc.hpp>
 #include <opencv2/video/tracking.hpp>
-#if defined(REGRADE_OPTFLOW)
-#include <opencv2/optflow.hpp>
-#endif
 
 #include "kernels/base/error.h"
+#if defined(REGRADE_OPTFLOW)
+#include "evaluate/flow_module.h"
+#include "kernels/process/program_module.h"
+#endif
 
 namespace regrade {
 namespace {
@@ -49,10 +50,10 @@ bool Contributed(const std::string& name) {
 
 cv::Ptr<cv::DenseOpticalFlow> MakeContributed([[maybe_unused]] const std::string& name) {
 #if defined(REGRADE_OPTFLOW)
-  if (name == "deepflow") return cv::optflow::createOptFlow_DeepFlow();
-  if (name == "tvl1") return cv::optflow::createOptFlow_DualTVL1();
-  if (name == "pca-flow") return cv::optflow::createOptFlow_PCAFlow();
-  return cv::optflow::createOptFlow_DenseRLOF();
+  cv::Ptr<cv::DenseOpticalFlow> method;
+  reinterpret_cast<decltype(&RegradeContributedFlow)>(
+      ModuleFunction("flow", "RegradeContributedFlow"))(name, &method);
+  return method;
 #else
   throw UsageError(
       "this build has no optical flow '" + name + "'", "--flow",

@@ -83,13 +83,13 @@ LAYERS = {
 ANY_MODULE_SOURCE = r"(reconstruct|stylize|evaluate)/.*\.(cc|cu)"
 ALLOWED = (
     ("OpenCV", r"opencv2/",
-     (r"evaluate/optical_flow\.cc", r"kernels/onnx/onnx_model\.cc", r"pipeline/images/(draw_text|edge_shift)\.cc")),
+     (r"evaluate/(flow_module|optical_flow)\.cc", r"kernels/onnx/onnx_model\.cc", r"pipeline/images/(draw_text|edge_shift)\.cc")),
     ("FFmpeg", r"lib(av|sw)[a-z]+/", (r"pipeline/images/(ffmpeg_pointers|film_(decoder|frame)|libraries|video_writer)\.cc",)),
-    ("OpenImageIO", r"OpenImageIO/", (r"pipeline/images/(image_file|libraries|picture_decoder|still_file)\.cc",)),
-    ("libjpeg-turbo", r"(jpeglib|jerror|jmorecfg|turbojpeg)\.h", (r"pipeline/images/jpeg_decoder\.cc",)),
+    ("OpenImageIO", r"OpenImageIO/", (r"pipeline/images/oiio_module\.cc",)),
+    ("libjpeg-turbo", r"(jpeglib|jerror|jmorecfg|turbojpeg)\.h", (r"pipeline/images/(jpeg_decoder|picture_encoder)\.cc",)),
     ("libheif", r"libheif/", (r"pipeline/images/(heif_decoder|libraries)\.cc",)),
     ("Little CMS", r"lcms2(_plugin)?\.h", (r"pipeline/images/color_profile\.cc",)),
-    ("libpng", r"(png|pngconf|pnglibconf)\.h", (r"pipeline/images/png_decoder\.cc",)),
+    ("libpng", r"(png|pngconf|pnglibconf)\.h", (r"pipeline/images/(picture_encoder|png_decoder)\.cc",)),
     ("Ceres", r"(ceres|glog)/", (r"reconstruct/refinement/(bundle|exposure|refine_poses)\.cc",)),
     ("Boost", r"boost/", (r"pipeline/program/option_binding\.cc", r"pipeline/view/(local_server|request_reader)\.cc",
       r"pipeline/networks/tensor_bundle\.cc", r"reconstruct/splats/initial_splats\.cc")),

@@ -2,8 +2,13 @@
 #pragma once
 
 #include <string>
+#include <string_view>
 
 namespace regrade {
+
+// Whether a folder has the name of one: "regrade-" and six characters. A killed process leaves
+// its own.
+bool IsPrivateFolderName(std::string_view name);
 
 // A new folder of mode 0700 and an unpredictable name, removed with all that is in it.
 class PrivateFolder {

@@ -10,8 +10,8 @@
 namespace regrade {
 namespace {
 
-constexpr double kMostNsvfSkew = 1e-3;   // of the focal length
-constexpr double kMostPixels = 1e9;  // of a focal length or a place
+constexpr double kMostNsvfSkew = 1e-3;  // of the focal length
+constexpr double kMostPixels = 1e9;     // of a focal length or a place
 
 using Lines = std::vector<std::vector<double>>;
 

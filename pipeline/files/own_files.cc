@@ -3,6 +3,7 @@
 #include <filesystem>
 
 #include "kernels/base/error.h"
+#include "kernels/process/private_folder.h"
 
 namespace regrade {
 namespace {
@@ -48,7 +49,10 @@ void RefuseForeignBelow(const std::string& path) {
   for (fs::recursive_directory_iterator it(path, error), end; !error && it != end;
        it.increment(error)) {
     std::error_code of_entry;
-    Refuse(it->path().string(), it->symlink_status(of_entry).type(), of_entry);
+    const fs::file_type type = it->symlink_status(of_entry).type();
+    Refuse(it->path().string(), type, of_entry);
+    if (type == fs::file_type::directory && IsPrivateFolderName(it->path().filename().string()))
+      it.disable_recursion_pending();
   }
   if (error) throw ResourceError("cannot list the folder: " + error.message(), path);
 }

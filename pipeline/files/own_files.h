@@ -11,7 +11,8 @@ namespace regrade {
 // is fine. kResources where that cannot be found out.
 void RefuseForeign(const std::string& path);
 
-// The same of all that is below the folder `path`, too.
+// The same of all that is below the folder `path`, too, but for what other programs left in
+// private folders (private_folder.h), of which nothing is read: COLMAP's log has links.
 void RefuseForeignBelow(const std::string& path);
 
 }  // namespace regrade

@@ -1,12 +1,6 @@
 #include "pipeline/images/image_file.h"
 
-#include <OpenImageIO/filesystem.h>
-#include <OpenImageIO/imageio.h>
-
 #include <algorithm>
-#include <limits>
-#include <memory>
-#include <vector>
 
 #include "kernels/base/error.h"
 #include "pipeline/files/atomic_file.h"
@@ -14,6 +8,7 @@
 #include "pipeline/images/decoder_process.h"
 #include "pipeline/images/normalize_photo.h"
 #include "pipeline/images/picture_decoder.h"
+#include "pipeline/images/picture_encoder.h"
 
 namespace regrade {
 namespace {
@@ -33,34 +28,8 @@ Image ReplicateGrey(const Image& grey) {
   return result;
 }
 
-template <typename Value>
-std::string Encode(const char* format, const Image& image, OIIO::ImageSpec spec) {
-  constexpr float kMax = std::numeric_limits<Value>::max();
-  std::vector<Value> values(image.pixels.size());
-  std::transform(image.pixels.begin(), image.pixels.end(), values.begin(), [](float v) {
-    return v > 0 ? static_cast<Value>(std::min(v, 1.f) * kMax + 0.5f) : Value{0};
-  });
-  std::vector<unsigned char> bytes;
-  OIIO::Filesystem::IOVecOutput memory(bytes);
-  std::unique_ptr<OIIO::ImageOutput> output = OIIO::ImageOutput::create(format);
-  REGRADE_CHECK(output != nullptr);
-  output->set_ioproxy(&memory);
-  const OIIO::TypeDesc type = OIIO::BaseTypeFromC<Value>::value;
-  if (!output->open(std::string("memory.") + format, spec) ||
-      !output->write_image(type, values.data()) || !output->close())
-    throw ResourceError(std::string("cannot encode ") + format + ": " + output->geterror());
-  return {bytes.begin(), bytes.end()};
-}
-
-template <typename Value>
-std::string EncodePng(const Image& image) {
-  OIIO::ImageSpec spec(image.width, image.height, image.channels,
-                       OIIO::BaseTypeFromC<Value>::value);
-  spec["oiio:UnassociatedAlpha"] = 1;
-  // Fast and nearly as small as the default of 6 on photographs.
-  spec["png:compressionLevel"] = 3;
-  return Encode<Value>("png", image, spec);
-}
+// Fast and nearly as small as the default of 6 on photographs.
+constexpr int kPngLevel = 3;
 
 }  // namespace
 
@@ -93,14 +62,10 @@ Image ReadStylePicture(const std::string& path, std::string* notice) {
   return CompositeOnWhite(ReplicateGrey(stored.image));
 }
 
-std::string EncodePng8(const Image& image) { return EncodePng<uint8_t>(image); }
-std::string EncodePng16(const Image& image) { return EncodePng<uint16_t>(image); }
-
+std::string EncodePng8(const Image& image) { return EncodePng(image, 8, kPngLevel, false); }
+std::string EncodePng16(const Image& image) { return EncodePng(image, 16, kPngLevel, false); }
 std::string EncodeJpeg(const Image& image, int quality) {
-  REGRADE_CHECK_LE(image.channels, 3);
-  OIIO::ImageSpec spec(image.width, image.height, image.channels, OIIO::TypeDesc::UINT8);
-  spec["Compression"] = "jpeg:" + std::to_string(quality);
-  return Encode<uint8_t>("jpeg", image, spec);
+  return EncodeJpeg(image, quality, false);
 }
 
 void WritePng8(const std::string& path, const Image& image) {

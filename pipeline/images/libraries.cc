@@ -1,7 +1,8 @@
 #include "pipeline/images/libraries.h"
 
-#include <OpenImageIO/imageio.h>
 #include <libheif/heif.h>
+
+#include "pipeline/images/oiio_module.h"
 
 extern "C" {
 #include <libavcodec/avcodec.h>
@@ -12,12 +13,11 @@ namespace regrade {
 
 std::vector<Library> PictureLibraries() {
   const bool h264 = avcodec_find_encoder_by_name("libx264") != nullptr;
-  const std::string readers = OIIO::get_string_attribute("format_list");
-  const bool raw = readers.find("raw") != std::string::npos;
+  const bool raw = Oiio().ReadsRaw();
   return {
       {"FFmpeg", av_version_info() + std::string(h264 ? "" : ", without libx264"),
        h264 ? "films in and out" : "reads films; writing them needs libx264"},
-      {"OpenImageIO", OIIO_VERSION_STRING + std::string(raw ? "" : ", without LibRaw"),
+      {"OpenImageIO", Oiio().Version() + (raw ? "" : ", without LibRaw"),
        raw ? "TIFF, WebP, OpenEXR and camera raw" : "TIFF, WebP and OpenEXR"},
       {"libheif", heif_get_version(), "HEIC and AVIF"},
   };

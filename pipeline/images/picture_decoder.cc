@@ -1,18 +1,13 @@
 #include "pipeline/images/picture_decoder.h"
 
-#include <OpenImageIO/filesystem.h>
-#include <OpenImageIO/imageio.h>
-#include <OpenImageIO/tiffutils.h>
 #include <omp.h>
 #include <sys/stat.h>
 
 #include <algorithm>
-#include <array>
+#include <atomic>
 #include <cerrno>
 #include <cstring>
-#include <memory>
 #include <utility>
-#include <vector>
 
 #include "kernels/base/error.h"
 #include "pipeline/files/atomic_file.h"
@@ -21,6 +16,7 @@
 #include "pipeline/images/heif_decoder.h"
 #include "pipeline/images/image_format.h"
 #include "pipeline/images/jpeg_decoder.h"
+#include "pipeline/images/oiio_module.h"
 #include "pipeline/images/png_decoder.h"
 #include "pipeline/images/webp_header.h"
 
@@ -61,36 +57,17 @@ void CheckRegularFile(const std::string& path) {
   if (kind) throw InputError(std::string(kind) + ", not a picture file", path);
 }
 
-// Seconds times sensitivity over the square of the f-number, which is 1 where it is not given.
-double LightOf(const OIIO::ImageSpec& spec) {
-  const auto number = [&spec](std::initializer_list<const char*> names) {
-    for (const char* name : names)
-      if (const float value = spec.get_float_attribute(name); value > 0) return value;
-    return 1.0f;
-  };
-  const float seconds = spec.get_float_attribute("ExposureTime");
-  const float sensitivity =
-      number({"Exif:PhotographicSensitivity", "Exif:ISOSpeedRatings", "Exif:ISOSpeed"});
-  const float stop = number({"FNumber"});
-  return seconds > 0 ? double{seconds} * sensitivity / (double{stop} * stop) : 0;
+// 0 until it is set: as many as OpenImageIO takes.
+std::atomic<int> threads_of_oiio = 0;
+
+const OiioModule& LimitedOiio() {
+  const OiioModule& oiio = Oiio();
+  if (const int threads = threads_of_oiio; threads > 0) oiio.LimitThreads(threads);
+  return oiio;
 }
 
-// Metadata under OpenImageIO's names.
-void TakeMetadata(const OIIO::ImageSpec& spec, StoredPicture* picture) {
-  const int orientation = spec.get_int_attribute("Orientation", 1);
-  picture->orientation = orientation >= 1 && orientation <= 8 ? orientation : 1;
-  picture->taken = spec.get_string_attribute("Exif:DateTimeOriginal");
-  const std::string fraction = spec.get_string_attribute("Exif:SubsecTimeOriginal");
-  if (!picture->taken.empty() && !fraction.empty()) picture->taken += "." + fraction;
-  picture->light = LightOf(spec);
-  picture->focal_mm = spec.get_float_attribute("Exif:FocalLength");
-  picture->focal_35mm = spec.get_float_attribute("Exif:FocalLengthIn35mmFilm");
-  picture->exif_width = spec.get_float_attribute("Exif:PixelXDimension");
-  // EXIF units: 2 inch (also the default), 3 cm, 4 mm, 5 um.
-  const int unit = spec.get_int_attribute("Exif:FocalPlaneResolutionUnit", 2);
-  const double unit_mm = unit == 3 ? 10 : unit == 4 ? 1 : unit == 5 ? 0.001 : 25.4;
-  picture->focal_plane_px_per_mm =
-      spec.get_float_attribute("Exif:FocalPlaneXResolution") / unit_mm;
+void TakeExif(std::string_view exif, StoredPicture* picture) {
+  if (!exif.empty()) LimitedOiio().TakeExif(exif, picture);
 }
 
 // Cameras set to Adobe RGB embed no profile: their EXIF block has the entry "R03" of the
@@ -116,9 +93,7 @@ StoredPicture ReadJpeg(std::string_view bytes, const std::string& where,
                        "copy the file again from the camera, or keep it with --accept-damaged");
     picture.notices.push_back(what);
   }
-  OIIO::ImageSpec spec;
-  if (!jpeg.exif.empty()) OIIO::decode_exif(OIIO::string_view(jpeg.exif), spec);
-  TakeMetadata(spec, &picture);
+  TakeExif(jpeg.exif, &picture);
   if (jpeg.from_cmyk)
     picture.notices.push_back(
         "CMYK was converted without its profile: colours are approximate");
@@ -136,9 +111,7 @@ StoredPicture ReadPng(std::string_view bytes, const std::string& where,
   picture.image = std::move(png.image);
   picture.bits = png.bits;
   picture.linear_light = png.linear_light;
-  OIIO::ImageSpec spec;
-  if (!png.exif.empty()) OIIO::decode_exif(OIIO::string_view(png.exif), spec);
-  TakeMetadata(spec, &picture);
+  TakeExif(png.exif, &picture);
   picture.icc = png.icc;
   picture.primaries = png.primaries;
   picture.transfer = png.transfer;
@@ -161,9 +134,7 @@ StoredPicture ReadHeif(std::string_view bytes, const std::string& where,
   picture.icc = std::move(heif.icc);
   picture.primaries = heif.primaries;
   picture.transfer = heif.transfer;
-  OIIO::ImageSpec spec;
-  if (!heif.exif.empty()) OIIO::decode_exif(OIIO::string_view(heif.exif), spec);
-  TakeMetadata(spec, &picture);
+  TakeExif(heif.exif, &picture);
   picture.orientation = 1;  // libheif has turned the picture; EXIF repeats the turn
   if (heif.pictures > 1) picture.notices.push_back("only the first picture of several is used");
   return picture;
@@ -187,86 +158,16 @@ void CheckSizeBeforeOpening(std::string_view decoder, std::string_view bytes,
 // OpenImageIO passes over the metadata of WebP.
 void TakeWebpMetadata(std::string_view bytes, StoredPicture* picture) {
   const WebpHeader header = ReadWebpHeader(bytes);
-  OIIO::ImageSpec spec;
-  if (!header.exif.empty())
-    OIIO::decode_exif(OIIO::string_view(header.exif.data(), header.exif.size()), spec);
-  TakeMetadata(spec, picture);
+  TakeExif(header.exif, picture);
   picture->icc = header.icc;
 }
 
-// Reads grey, RGB, or RGB + alpha of the file's channels, as exact quotients value / max: every
-// decoder gives the same float for the same integer.
-template <typename Value>
-bool ReadChannels(OIIO::ImageInput* input, const OIIO::ImageSpec& spec, float max,
-                  Image* image) {
-  const int stored = spec.nchannels;
-  const bool has_alpha = spec.alpha_channel >= 0 && spec.alpha_channel < stored && stored > 1;
-  const bool grey = stored - (has_alpha ? 1 : 0) < 3;
-  std::vector<Value> values(static_cast<size_t>(spec.width) * spec.height * stored);
-  if (!input->read_image(0, 0, 0, stored, OIIO::BaseTypeFromC<Value>::value, values.data()))
-    return false;
-  *image = Image(spec.width, spec.height, has_alpha ? 4 : grey ? 1 : 3);
-  for (int64_t i = 0; i < image->num_pixels(); ++i) {
-    const Value* from = &values[static_cast<size_t>(i) * stored];
-    float* to = &image->pixels[i * image->channels];
-    for (int c = 0; c < std::min(image->channels, 3); ++c)
-      to[c] = static_cast<float>(from[grey ? 0 : c]) / max;
-    if (has_alpha) to[3] = static_cast<float>(from[spec.alpha_channel]) / max;
-  }
-  return true;
-}
-
-StoredPicture ReadWithOiio(const ImageFormat& format, std::string_view bytes,
-                           const std::string& path, const DecodeLimits& limits) {
-  const auto refuse = [&](const std::string& why) {
-    throw InputError(std::string("cannot read this ") + format.name + ": " + why, path,
-                     format.remedy);
-  };
-  std::unique_ptr<OIIO::ImageInput> input = OIIO::ImageInput::create(format.decoder);
-  if (input == nullptr) {
-    OIIO::geterror();
-    refuse("this build has no decoder for it");
-  }
-  OIIO::ImageSpec spec, config;
-  config["oiio:UnassociatedAlpha"] = 1;
-  // Camera raw: the same development for every photo.
-  config["raw:ColorSpace"] = "sRGB";
-  config["raw:use_camera_wb"] = 1;
-  config["raw:auto_bright"] = 0;
-  config["raw:adjust_maximum_thr"] = 0.f;
-  OIIO::Filesystem::IOMemReader memory(bytes.data(), bytes.size());
-  if (format.from_memory) input->set_ioproxy(&memory);
-  if (!input->open(path, spec, config)) refuse(input->geterror());
-  CheckSize(spec.width, spec.height, static_cast<int64_t>(spec.pixel_bytes(true)),
-            std::ssize(bytes), limits, path);
-  if (spec.deep || spec.depth > 1) refuse("it is not a flat picture");
-
-  StoredPicture picture;
-  bool whole = false;
-  if (spec.format == OIIO::TypeDesc::UINT8) {
-    whole = ReadChannels<uint8_t>(input.get(), spec, 255.f, &picture.image);
-  } else if (spec.format == OIIO::TypeDesc::UINT16) {
-    picture.bits = 16;
-    whole = ReadChannels<uint16_t>(input.get(), spec, 65535.f, &picture.image);
-  } else {
-    picture.bits = 32;
-    whole = ReadChannels<float>(input.get(), spec, 1.f, &picture.image);
-  }
-  if (!whole) refuse(input->geterror());
-  TakeMetadata(spec, &picture);
-  const OIIO::string_view space = spec.get_string_attribute("oiio:ColorSpace");
-  picture.linear_light = OIIO::Strutil::iequals(space, "linear");
-  picture.premultiplied = spec.get_int_attribute("oiio:UnassociatedAlpha") == 0;
-  if (const OIIO::ParamValue* profile = spec.find_attribute("ICCProfile"))
-    picture.icc.assign(static_cast<const char*>(profile->data()),
-                       static_cast<size_t>(profile->datasize()));
-  std::array<float, 8> chromaticities;
-  if (spec.getattribute("chromaticities", OIIO::TypeDesc(OIIO::TypeDesc::FLOAT, 8),
-                        chromaticities.data()))
-    picture.chromaticities = chromaticities;
-  if (input->seek_subimage(1, 0))
-    picture.notices.push_back("only the first picture of several is used");
-  return picture;
+StoredPicture ReadOther(const ImageFormat& format, std::string_view bytes,
+                        const std::string& path, const DecodeLimits& limits) {
+  return LimitedOiio().Read(format, bytes, path,
+                            [&](int64_t w, int64_t h, int64_t pixel_bytes) {
+                              CheckSize(w, h, pixel_bytes, std::ssize(bytes), limits, path);
+                            });
 }
 
 }  // namespace
@@ -287,7 +188,7 @@ StoredPicture DecodePicture(const std::string& path, const DecodeLimits& limits)
   StoredPicture picture = decoder == "jpeg"   ? ReadJpeg(bytes, path, limits)
                           : decoder == "png"  ? ReadPng(bytes, path, limits)
                           : decoder == "heif" ? ReadHeif(bytes, path, limits)
-                                              : ReadWithOiio(*format, bytes, path, limits);
+                                              : ReadOther(*format, bytes, path, limits);
   if (decoder == "webp") TakeWebpMetadata(bytes, &picture);
   ApplyPhotoRules(&picture, path);
   return picture;
@@ -298,7 +199,7 @@ int64_t MostPixelsOf(int64_t file_bytes) {
 }
 
 void LimitDecodingThreads(int threads) {
-  OIIO::attribute("threads", threads);
+  threads_of_oiio = threads;
   omp_set_num_threads(threads);
 }
 

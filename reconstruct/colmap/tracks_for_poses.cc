@@ -22,7 +22,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr int kFeatures = 768;   // per photo: give hundreds of tracks
+constexpr int kFeatures = 768;        // per photo: give hundreds of tracks
 constexpr int kSmallTrackSide = 900;  // pixels; upsamples smaller photos, as in the strategies
 // COLMAP's own limit of the reprojection error, pixels ...
 constexpr double kStrictLimit = 4;

@@ -35,7 +35,8 @@ class Wct2 : public ViewStylizer {
     });
     Restyled(trial);
     style_.clear();
-    const FeatureMap picture = Padded(MapOf(Working(Colors(style), max_side_, 1)), kWct2Multiple);
+    const FeatureMap picture =
+        Padded(MapOf(Working(Colors(style), max_side_, 1)), kWct2Multiple);
     Restyle(picture, [this](const std::string& place, FeatureMap* x) {
       style_[place] = MeasureFeatures(*x, 1);
     });

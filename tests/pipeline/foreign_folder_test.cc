@@ -136,6 +136,18 @@ TEST(ForeignFolder, LinksAndPipesAmongItsFilesAreRefusedByName) {
   EXPECT_NO_THROW(Workspace(folder / "out"));
 }
 
+TEST(ForeignFolder, LinksThatAKilledProgramLeftAreNoObstacle) {
+  const TemporaryFolder folder;
+  { const Workspace workspace(folder / "e"); }
+  const fs::path logs = folder / "e/.regrade/work/pose/logs";
+  fs::create_directories(logs / "regrade-aB3xYz");
+  fs::create_symlink("colmap.INFO.1", logs / "regrade-aB3xYz/colmap.INFO");
+  EXPECT_NO_THROW(Workspace(folder / "e"));
+  fs::create_symlink("regrade-aB3xYz", logs / "regrade-cD3xYz");
+  EXPECT_REGRADE_ERROR(Workspace(folder / "e"), ExitCode::kInput,
+                       (logs / "regrade-cD3xYz").string());
+}
+
 TEST(ForeignFolder, AStyleThatIsALinkIsNoStyle) {
   const TemporaryFolder folder;
   WriteRun(folder / "other/styles/x/run.json", JsonValue::Object());

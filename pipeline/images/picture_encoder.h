@@ -1,0 +1,18 @@
+// Encodes PNG and JPEG files in memory, with libpng and libjpeg.
+#pragma once
+
+#include <string>
+
+#include "kernels/scene/image.h"
+
+namespace regrade {
+
+// Values are clamped to [0, 1] and rounded half up; NaN becomes 0. `tagged`: the file says that
+// its colours are sRGB. Both throw Error(kResources).
+
+// 1, 3 or 4 channels (straight alpha), `bits` 8 or 16, zlib's `level` 0 to 9.
+std::string EncodePng(const Image& image, int bits, int level, bool tagged);
+// 1 or 3 channels; `quality` 1 to 100.
+std::string EncodeJpeg(const Image& image, int quality, bool tagged);
+
+}  // namespace regrade
