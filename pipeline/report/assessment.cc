@@ -113,7 +113,7 @@ Part Steady(const RunReport& report) {
   part.grade = 1 + std::min(0.0, gain) / 3;  // 3 dB twice the squared error
   part.advice = IsOneMap(report)
                     ? "--strength 0.7 applies less of the style, which is steadier"
-                    : "--scene-wide uses one colour map for all photos, the steadiest there is";
+                    : "--scene-wide uses one colour map for all views, the steadiest there is";
   return part;
 }
 
@@ -123,20 +123,20 @@ Part Faithful(const RunReport& report) {
                                      &FidelityMetrics::sequence);
   if (row == report.evaluation.fidelity.end()) return {"faithful: not measured", ""};
   const Metric& psnr = row->psnr_to_2d_db;
-  if (psnr.infinite) return {"faithful: exactly the recoloured photos", "", 1};
+  if (psnr.infinite) return {"faithful: exactly the recoloured views", "", 1};
   if (!psnr.value) return {"faithful: not measured (" + psnr.why + ")", ""};
   const auto& evaluate = report.stages.evaluate;
   const bool edit = evaluate && evaluate->edit_seen;
   Part part;
   part.sentence = Format("faithful: %.1f dB to the %s, %s", *psnr.value,
-                         edit ? "edit where its photo sees the scene" : "recoloured photos",
+                         edit ? "edit where its photo sees the scene" : "recoloured views",
                          *psnr.value >= 30   ? "close"
                          : *psnr.value >= 25 ? "mostly close"
                                              : "apart in places");
   part.grade = *psnr.value / 30;
   part.advice =
       edit ? "edit a photo that shows more of what is to change, seen from nearby"
-           : "--style-view-weight 0 follows each recoloured photo more closely, and is less "
+           : "--style-view-weight 0 follows each recoloured view more closely, and is less "
              "steady";
   return part;
 }

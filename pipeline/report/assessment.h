@@ -10,7 +10,7 @@ namespace regrade {
 
 struct Assessment {
   // "sharp: 71 % of the photos' detail", "steady: the film is 1.0 dB steadier than frame by
-  // frame", "faithful: 33.9 dB to the recoloured photos, close". One that was not measured has
+  // frame", "faithful: 33.9 dB to the recoloured views, close". One that was not measured has
   // its reason.
   std::vector<std::string> sentences;
   std::string advice;  // about the weakest

@@ -3,7 +3,9 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <vector>
 
+#include "kernels/base/quantile.h"
 #include "kernels/splats/covariance.h"
 #include "pipeline/files/atomic_file.h"
 #include "pipeline/files/byte_packing.h"
@@ -26,9 +28,42 @@ uint8_t ToByte(double value) {
   return static_cast<uint8_t>(std::clamp(std::round(value), 0.0, 255.0));
 }
 
-int FractionalBits(const Splats& splats) {
-  float farthest = 0;
-  for (const float x : splats.mean) farthest = std::max(farthest, std::abs(x));
+// Positions share one step, a 2^23rd of the farthest at best: a single splat far outside would
+// make all of them coarse. Those that are so many times farther from the middle than half of
+// the splats are drawn in to there and made as much smaller: from the middle they look the
+// same.
+constexpr double kReach = 100;
+
+struct Reach {
+  Vec3d middle;
+  double most;  // from there
+
+  explicit Reach(const Splats& splats) {
+    std::vector<double> along(splats.count());
+    for (int a = 0; a < 3; ++a) {
+      for (size_t i = 0; i < along.size(); ++i) along[i] = splats.mean[3 * i + a];
+      middle[a] = Median(along);
+    }
+    for (size_t i = 0; i < along.size(); ++i) along[i] = Norm(Mean(splats, i) - middle);
+    most = kReach * Median(along);
+  }
+  static Vec3d Mean(const Splats& splats, size_t i) {
+    return {splats.mean[3 * i], splats.mean[3 * i + 1], splats.mean[3 * i + 2]};
+  }
+  // How much nearer a splat is drawn; at most 1.
+  double ShareOf(const Vec3d& mean) const {
+    const double distance = Norm(mean - middle);
+    return most > 0 && distance > most ? most / distance : 1;
+  }
+  Vec3d Within(const Vec3d& mean) const { return middle + (mean - middle) * ShareOf(mean); }
+};
+
+int FractionalBits(const Splats& splats, const Reach& reach) {
+  double farthest = 0;
+  for (int64_t i = 0; i < splats.count(); ++i) {
+    const Vec3d mean = reach.Within(Reach::Mean(splats, i));
+    for (int a = 0; a < 3; ++a) farthest = std::max(farthest, std::abs(mean[a]));
+  }
   int bits = kMostBits;
   while (bits > 0 && std::ldexp(farthest, bits) >= 8388607) --bits;
   return bits;
@@ -71,7 +106,8 @@ uint8_t HarmonicByte(float value, int step) {
 }  // namespace
 
 void WriteSpz(const std::string& path, const Splats& splats, bool antialiased) {
-  const int bits = FractionalBits(splats), basis = splats.basis;
+  const Reach reach(splats);
+  const int bits = FractionalBits(splats, reach), basis = splats.basis;
   BytePacker header;
   header.Value(uint32_t{0x5053474e});  // NGSP
   header.Value(kWrittenVersion);
@@ -84,6 +120,12 @@ void WriteSpz(const std::string& path, const Splats& splats, bool antialiased) {
   std::string positions, opacities, colors, scales, rotations, harmonics;
   for (const int64_t i : MortonOrder(splats.view())) {
     SplatRecord record = SplatAt(splats.view(), i);
+    const Vec3d mean = record.splat.mean.Cast<double>();
+    if (const double share = reach.ShareOf(mean); share < 1) {
+      record.splat.mean = reach.Within(mean).Cast<float>();
+      for (int a = 0; a < 3; ++a)
+        record.splat.log_scale[a] += static_cast<float>(std::log(share));
+    }
     turn.Apply(basis, &record);
     AppendPosition(record.splat.mean, bits, &positions);
     opacities.push_back(

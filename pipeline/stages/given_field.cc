@@ -77,6 +77,7 @@ Stage GivenFieldStage(RunContext* context) {
   const RunSettings& settings = context->settings;
   Stage stage;
   stage.name = "reconstruct";
+  stage.title = "taking the splats as they are";
   stage.inputs = JsonValue::Object{{"poses", context->ResultOf("pose")},
                                    {"splats", HashFile(context->source)},
                                    {"options", OptionValues(settings.scene)},

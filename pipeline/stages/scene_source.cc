@@ -5,6 +5,7 @@
 #include "kernels/base/error.h"
 #include "kernels/render/field_renderer.h"
 #include "pipeline/program/device_choice.h"
+#include "pipeline/run/fit_kind.h"
 #include "pipeline/splat_files/read_splats.h"
 #include "pipeline/stages/foreign_splats.h"
 #include "pipeline/stages/given_field.h"
@@ -33,8 +34,17 @@ constexpr SceneSource kPhotos{
     .hash = [](const RunContext&) { return JsonValue(); },
     .add_points = nullptr};
 
+// What decides a fit decides nothing here.
+void RefuseFlagsOfFits(const OptionSet& options) {
+  for (const FitKind* kind : FitKinds())
+    for (const auto& [name, value] : kind->options({}).AsObject())
+      if (options.Given(name))
+        throw UsageError("a file of splats is not fitted", "--" + name, "leave it out");
+}
+
 void ProbeSplats(RunContext* context) {
   RunSettings& settings = context->settings;
+  RefuseFlagsOfFits(context->options);
   std::string& cameras = settings.splat_input.cameras;
   if (settings.scene.Kind().lattice)
     throw UsageError("splats do not become voxels", context->source,

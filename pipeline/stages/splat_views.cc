@@ -148,6 +148,7 @@ Stage SplatViewsStage(RunContext* context) {
   const SplatInput& given = context->settings.splat_input;
   Stage stage;
   stage.name = "pose";
+  stage.title = given.cameras.empty() ? "placing views" : "rendering the views of the cameras";
   stage.inputs = JsonValue::Object{{"splats", HashFile(context->source)},
                                    {"photo_size", context->settings.scene.photo_size}};
   if (given.cameras.empty())

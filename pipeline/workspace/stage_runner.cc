@@ -15,7 +15,7 @@ namespace {
 // What a person reads.
 constexpr const char* kTitles[] = {"finding where each photo was taken",
                                    "fitting the scene to the photos",
-                                   "recolouring each photo",
+                                   "recolouring each view",
                                    "applying the style to the scene",
                                    "rendering frames and films",
                                    "measuring",
@@ -27,12 +27,14 @@ size_t PlaceOf(const std::string& stage) {
   return static_cast<size_t>(found - std::begin(kStageNames));
 }
 
-}  // namespace
-
-std::string StageTitle(const std::string& stage) {
-  const size_t place = PlaceOf(stage);
-  return Concat("stage ", place + 1, " of ", std::size(kStageNames), ": ", kTitles[place]);
+// "stage 2 of 7: fitting the scene to the photos".
+std::string TitleOf(const Stage& stage) {
+  const size_t place = PlaceOf(stage.name);
+  return Concat("stage ", place + 1, " of ", std::size(kStageNames), ": ",
+                stage.title.empty() ? kTitles[place] : stage.title);
 }
+
+}  // namespace
 
 std::string StageRunner::About(const std::string& stage) const {
   const auto own = expected_.find(stage);
@@ -96,9 +98,9 @@ bool StageRunner::Run(const Stage& stage) {
     if (const auto next = expected_.find(kStageNames[i]); next != expected_.end())
       later += next->second;
   const auto own = expected_.find(stage.name);
-  console_->Info(StageTitle(stage.name));
-  console_->BeginStage(stage.name, StageTitle(stage.name),
-                       own != expected_.end() ? own->second : 0, later);
+  console_->Info(TitleOf(stage));
+  console_->BeginStage(stage.name, TitleOf(stage), own != expected_.end() ? own->second : 0,
+                       later);
   const double cpu_before = CpuSeconds();
   StageOutcome outcome;
   try {

@@ -23,9 +23,6 @@ inline bool IsOfScene(const std::string& stage) {
   return stage == "pose" || stage == "reconstruct";
 }
 
-// "stage 2 of 7: fitting the scene to the photos".
-std::string StageTitle(const std::string& stage);
-
 struct StageOutcome {
   std::vector<std::string> outputs;  // files and folders, relative to the output folder
   JsonValue metrics = JsonValue::Object();
@@ -33,6 +30,8 @@ struct StageOutcome {
 
 struct Stage {
   std::string name;
+  std::string title =
+      {};            // what it does, where that is not what stages of its name do otherwise
   JsonValue inputs;  // object: all inputs of the result
   // If the recorded inputs differ: redo the stage, or refuse with the difference (for work that
   // a typing mistake should not discard).

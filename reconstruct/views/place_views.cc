@@ -24,6 +24,8 @@ constexpr double kFewestHoles = 0.6;  // quality of a view over the middle one
 constexpr double kFarFromBest = 0.45;  // worth of a view over the best one's
 // Of objects 1.2 to 2.6; a room whose walls look as well from behind has 1.02.
 constexpr double kObjectShowsMore = 1.1;
+// A middle of detail that is not clearly smaller than the whole adds no places.
+constexpr double kSameExtent = 0.85;
 // A view is too similar to another one within this part of the radius and this angle.
 constexpr double kSamePlace = 0.12, kSameWay = 0.97;
 
@@ -116,20 +118,20 @@ class Placement {
     return within;
   }
 
-  // Places around the middle at some distances, which look at it.
-  std::vector<Candidate> Around(const ProgressFunction& progress) const {
+  // Places around a middle at some distances, which look at it.
+  std::vector<Candidate> Around(const SplatExtent& extent,
+                                const ProgressFunction& progress) const {
     constexpr int kDirections = 12;
     std::vector<Candidate> around;
     int done = 0;
-    for (const double distance : {0.7, 1.1, 1.7, 2.6})
+    for (const double distance : {0.7, 1.1, 1.7, 2.6, 4.0})
       for (const double elevation : {-8.0, 8.0, 24.0, 45.0, 70.0}) {
-        ReportOrThrow(progress, done, 20);
+        ReportOrThrow(progress, done, 25);
         const double turn = 0.5 * (done++ % 2);
         for (int i = 0; i < kDirections; ++i) {
           const Vec3d way =
               stage_.Way(2 * std::numbers::pi * (i + turn) / kDirections, Radians(elevation));
-          around.push_back(Probe(stage_.extent.center + way * (distance * stage_.extent.inner),
-                                 -way, false));
+          around.push_back(Probe(extent.center + way * (distance * extent.inner), -way, false));
         }
       }
     return around;
@@ -262,11 +264,16 @@ Stage StageOf(const Splats& splats, const Vec3d& up) {
 PlacedViews PlaceViews(const Splats& splats, const FieldRenderer& renderer, const Vec3d& up,
                        int longest, const std::string& where,
                        const ProgressFunction& progress) {
-  const Placement placement(renderer, StageOf(splats, up), SampleSplats(splats, kSamples));
-  ProgressParts parts(progress, 5);
+  const Stage stage = StageOf(splats, up);
+  const Placement placement(renderer, stage, SampleSplats(splats, kSamples));
+  ProgressParts parts(progress, 6);
   const std::vector<Candidate> rings = placement.Rings(parts.Next(0.5));
   std::vector<Candidate> all = placement.Within(parts.Next(1));
-  std::ranges::move(placement.Around(parts.Next(2.5)), std::back_inserter(all));
+  std::ranges::move(placement.Around(stage.extent, parts.Next(2.5)), std::back_inserter(all));
+  // Where photos went around a small part of what they show, that is where detail is.
+  if (const SplatExtent fine = ExtentOf(splats, SplatWeight::kDetail);
+      !(fine.inner > kSameExtent * stage.extent.inner))
+    std::ranges::move(placement.Around(fine, parts.Next(1)), std::back_inserter(all));
   const double outside = ShownBy(rings, [](const Candidate&c) { return c.probe.Quality(); }),
                filled = ShownBy(all, [](const Candidate&c) { return c.filled; });
   const bool object = outside > kObjectShowsMore * filled;

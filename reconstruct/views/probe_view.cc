@@ -38,9 +38,7 @@ std::vector<SplatSample> SampleSplats(const Splats& splats, int64_t most) {
   std::vector<SplatSample> samples;
   for (const int64_t i : OpaqueSplats(view, most)) {
     const Splat<float> splat = view[i];
-    const double a = splat.log_scale[0], b = splat.log_scale[1], c = splat.log_scale[2];
-    const double middle = std::max(std::min(a, b), std::min(std::max(a, b), c));
-    samples.push_back({splat.mean.Cast<double>(), std::exp(std::min(80.0, middle))});
+    samples.push_back({splat.mean.Cast<double>(), SizeOf(splat)});
   }
   return samples;
 }

@@ -20,12 +20,25 @@ double WeightedQuantile(std::vector<std::pair<double, double>> values, double q)
 
 }  // namespace
 
-SplatExtent ExtentOf(const Splats& splats) {
+double SizeOf(const Splat<float>& splat) {
+  const double a = splat.log_scale[0], b = splat.log_scale[1], c = splat.log_scale[2];
+  const double middle = std::max(std::min(a, b), std::min(std::max(a, b), c));
+  return std::exp(std::clamp(middle, -80.0, 80.0));
+}
+
+SplatExtent ExtentOf(const Splats& splats, SplatWeight by) {
   SplatExtent extent;
   const SplatsView<float> view = splats.view();
   std::vector<std::pair<double, double>> values(static_cast<size_t>(view.count));
-  const auto weight = [&view](int64_t i) {
-    return 1 / (1 + std::exp(-double{view.opacity_logit[i]}));
+  double finest = 0;  // smaller ones count as this
+  if (by == SplatWeight::kDetail) {
+    for (int64_t i = 0; i < view.count; ++i)
+      values[static_cast<size_t>(i)] = {SizeOf(view[i]), 1};
+    finest = WeightedQuantile(values, 0.01);
+  }
+  const auto weight = [&](int64_t i) {
+    const double opacity = 1 / (1 + std::exp(-double{view.opacity_logit[i]}));
+    return by == SplatWeight::kDetail ? opacity / std::max(finest, SizeOf(view[i])) : opacity;
   };
   for (int a = 0; a < 3; ++a) {
     for (int64_t i = 0; i < view.count; ++i)

@@ -9,7 +9,7 @@
 
 namespace regrade {
 
-// Sizes are in the units of the splats. Splats count by their opacity.
+// Sizes are in the units of the splats.
 struct SplatExtent {
   Vec3d center;       // the median along each axis
   double radius = 1;  // of the ball around it with nine tenths of them; > 0
@@ -17,7 +17,16 @@ struct SplatExtent {
   double outer = 1;   // of the one with all but a fiftieth of them; > 0
 };
 
-SplatExtent ExtentOf(const Splats& splats);
+enum class SplatWeight {
+  kOpacity,
+  kDetail,  // opacity over size: splats are small where photos show much of them, the middle of
+            // interest
+};
+
+SplatExtent ExtentOf(const Splats& splats, SplatWeight by = SplatWeight::kOpacity);
+
+// The middle one of the standard deviations, world units; finite.
+double SizeOf(const Splat<float>& splat);
 
 // Splats of less opacity than 0.3 show little by themselves.
 inline constexpr float kOpaqueLogit = -0.85f;

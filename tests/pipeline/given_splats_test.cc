@@ -289,6 +289,8 @@ TEST(GivenSplats, WhatDoesNotFitIsRefused) {
   refuses(ball, {"--cameras", folder / "empty"}, input, "has no cameras");
   refuses(ball, {"--cameras", folder / "none"}, input, "no such folder or file");
   refuses(ball, {"--up", "z", "--cameras", folder / "other.json"}, usage, "--up and --cameras");
+  refuses(ball, {"--splat-steps", "9"}, usage, "is not fitted");
+  refuses(ball, {"--sh-degree", "1"}, usage, "is not fitted");
   refuses(folder / "empty", {"--cameras", folder / "other.json"}, usage, "--cameras");
 }
 

@@ -103,6 +103,31 @@ TEST(WriteSpz, ComesBackWithinHalfAStep) {
     }
 }
 
+TEST(WriteSpz, ASplatFarOutsideLeavesTheOthersAsFine) {
+  const TemporaryFolder folder;
+  const Splats near = ToWrite(4);
+  Splats splats = near;
+  splats.mean[0] = 4e4f, splats.mean[1] = 3e4f, splats.mean[2] = 0;
+  splats.log_scale[0] = 3;
+  WriteSpz(folder / "a.spz", splats, false);
+  const SplatScene scene = ReadSplats(folder / "a.spz");
+  ASSERT_EQ(scene.splats.count(), splats.count());
+  const std::vector<int64_t> order = MortonOrder(splats.view());
+  for (int64_t i = 0; i < splats.count(); ++i) {
+    const SplatRecord back = SplatAt(scene.splats.view(), i);
+    const int64_t of = order[static_cast<size_t>(i)];
+    if (of != 0) {
+      EXPECT_LT(Norm(back.splat.mean - SplatAt(near.view(), of).splat.mean), 2e-5f);
+      continue;
+    }
+    // Drawn in to a hundred times the distance of half of the splats, which is .7 or so.
+    const double distance = Norm(back.splat.mean);
+    EXPECT_TRUE(distance > 30 && distance < 150) << distance;
+    EXPECT_NEAR(back.splat.mean.x / distance, 0.8, 0.01);
+    EXPECT_NEAR(back.splat.log_scale.x, 3 + std::log(distance / 5e4), 0.1);
+  }
+}
+
 // Unpacked a header of 16 bytes, then 9 + 1 + 3 + 3 + 4 + 45 for each splat.
 TEST(WriteSpz, IsAGzipFileOfVersion3) {
   const TemporaryFolder folder;
