@@ -42,7 +42,8 @@ struct MaskOptions {
          {.unit = "fraction of votes",
           .help = "half the width of the object's soft edge; 0 makes a hard edge",
           .min = 0,
-          .max = 0.5});
+          .max = 0.5,
+          .constant = true});
   }
 };
 

@@ -52,10 +52,10 @@ class CommandStylizer : public ViewStylizer {
     options.wall_limit_s = limit_s_;
     const ChildResult result = RunChild(options);
     if (!result.Succeeded())
-      throw ProgramError("the style command failed: " + result.Describe() + result.LastLines(),
-                         where,
-                         result.TimedOut() ? "--style-command-limit gives it longer"
-                                           : "run the command by hand on one photo");
+      throw ProgramError(
+          "the style command failed: " + result.Describe() + result.LastLines(), where,
+          result.TimedOut() ? "a larger constant style-command-limit (--config) gives it longer"
+                            : "run the command by hand on one photo");
     std::error_code error;
     if (!fs::exists(output, error))
       throw ProgramError("the style command left no picture at {output}", where, kHint);

@@ -54,15 +54,16 @@ void SetVariance(const RestyledField& restyled, const std::vector<StyledTraining
                  StylizeReport* metrics) {
   std::vector<Camera> cameras;
   for (const StyledTrainingView& view : views) cameras.push_back(view.camera);
-  const MarchOptions march{restyled.source.step};
+  const RadianceField& source = restyled.source;
+  const MarchOptions march{source.step};
+  const auto weigher = MakeRayWeigher(*source.geometry, source.near_clip, march, 0, kManyViews);
   const auto measure = [&](const RayPairs& pairs) {
-    return MetricsOfVariance(MeasureVariance(restyled.source, restyled.styled,
-                                             restyled.trained.network, pairs, march,
-                                             object_weights));
+    return MetricsOfVariance(MeasureVariance(source, restyled.styled, restyled.trained.network,
+                                             pairs, march, object_weights, weigher.get()));
   };
   metrics->variance = measure(NeighbouringPixels(cameras, kVariancePairs, seed));
   metrics->variance_across_views =
-      measure(PixelsOfOnePoint(restyled.source, cameras, kVariancePairs, seed, march));
+      measure(PixelsOfOnePoint(source, cameras, kVariancePairs, seed, march, weigher.get()));
 }
 
 // Why the local Lipschitz constant is above what the colours' covariances predict, where it is.

@@ -49,7 +49,7 @@ const char* LikelyCause(const ChildResult& result) {
     return "raise --pose-time-limit if there are many photos or the machine is slow";
   if (result.signal == SIGKILL)
     return "the system killed it, probably because memory ran out: close other programs, or "
-           "lower --pose-image-size";
+           "lower the constant pose-image-size (--config)";
   if (result.signal == SIGILL) return "this colmap was built for another kind of processor";
   if (result.signal != 0 || result.exit_status >= 128) return "COLMAP crashed; see its log";
   return "see its log";

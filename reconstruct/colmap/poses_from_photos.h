@@ -37,7 +37,8 @@ struct PoseOptions {
           .help = "longer side for feature extraction; 2000 takes about 4 times as long and "
                   "hardly changes the poses",
           .min = 200,
-          .max = 20000});
+          .max = 20000,
+          .constant = true});
     bind(
         "pose-all-pairs-up-to", all_pairs_up_to,
         {.unit = "photos",

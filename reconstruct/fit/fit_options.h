@@ -101,7 +101,8 @@ struct FitOptions {
          {.help = "view dependence: spherical harmonics degree 0, 1 or 2 (1, 4, 9 values per "
                   "channel); a small trial falls back to 0 where that loses nothing",
           .min = 0,
-          .max = 2});
+          .max = 2,
+          .constant = true});
     bind("fit-mean-bound", bound_mean,
          {.help = "keeps the mean colour of a voxel within [0, 1], and that of background "
                   "layers",

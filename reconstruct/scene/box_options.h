@@ -39,7 +39,8 @@ struct BoxOptions {
          {.help = "grey behind everything; below 0: the photos' mean colour, or white behind "
                   "transparent photos",
           .min = -1,
-          .max = 1});
+          .max = 1,
+          .constant = true});
   }
 };
 

@@ -54,7 +54,8 @@ struct SplatFitOptions {
     bind("splat-degree", sh_degree,
          {.help = "view dependence: degree of the splats' spherical harmonics",
           .min = 0,
-          .max = 3});
+          .max = 3,
+          .constant = true});
     bind("splat-opacity-weight", opacity_weight,
          {.help = "weight of the mean opacity in the loss: larger values leave fewer "
                   "half-transparent splats",

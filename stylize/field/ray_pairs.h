@@ -8,6 +8,7 @@
 
 #include "kernels/field/radiance_field.h"
 #include "kernels/field/ray_march.h"
+#include "kernels/render/ray_weigher.h"
 #include "kernels/scene/view_rays.h"
 
 namespace regrade {
@@ -23,7 +24,10 @@ RayPairs NeighbouringPixels(const std::vector<Camera>& cameras, int64_t count, u
 // EQ(geometric-flow). The point must lie in the next view's frame, and that ray's own depth be
 // within 1 % of the point's, as the evaluator asks. Rays that let more light pass than they
 // meet have no depth. Fewer than two cameras have no pairs. The same for any number of threads.
+// `weigher`: of the field, exact, with the least weight 0, to share among calls; null makes
+// one.
 RayPairs PixelsOfOnePoint(const RadianceField& field, const std::vector<Camera>& cameras,
-                          int64_t count, uint64_t seed, const MarchOptions& march);
+                          int64_t count, uint64_t seed, const MarchOptions& march,
+                          RayWeigher* weigher = nullptr);
 
 }  // namespace regrade

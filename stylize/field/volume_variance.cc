@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <memory>
 
 #include "kernels/base/error.h"
 #include "kernels/field/field_kind.h"
@@ -249,11 +250,12 @@ void Add(double source, double styled, double k, VarianceGroup* group) {
 VarianceReport MeasureVariance(const RadianceField& source, const RadianceField& styled,
                                const LipschitzNetwork& network, const RayPairs& pairs,
                                const MarchOptions& march,
-                               const std::vector<float>* object_weights) {
+                               const std::vector<float>* object_weights, RayWeigher* weigher) {
   if (object_weights != nullptr)
     REGRADE_CHECK_EQ(std::ssize(*object_weights), source.geometry->num_voxels());
-  const RayWeights weights =
-      MakeRayWeigher(*source.geometry, source.near_clip, march)->Weigh(pairs);
+  std::unique_ptr<RayWeigher> own;
+  if (weigher == nullptr) own = MakeRayWeigher(*source.geometry, source.near_clip, march);
+  const RayWeights weights = (own != nullptr ? own.get() : weigher)->Weigh(pairs);
   const Observer observer(source, styled, network, object_weights);
   struct Result {
     double source, styled, fraction;

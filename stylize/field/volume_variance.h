@@ -31,6 +31,7 @@
 
 #include "kernels/field/radiance_field.h"
 #include "kernels/field/ray_march.h"
+#include "kernels/render/ray_weigher.h"
 #include "stylize/field/lipschitz_network.h"
 #include "stylize/field/ray_pairs.h"
 
@@ -66,10 +67,11 @@ inline constexpr double kTransparentTransmittance = 1e-2;  // more than that is 
 
 // `styled` is `source` restyled by `network`, where `object_weights` [voxels] are given by
 // MixFields with them. Colours are as rendered, but not clipped to [0, 1]. Sums in double; the
-// result does not depend on the number of threads.
+// result does not depend on the number of threads. `weigher`: as of PixelsOfOnePoint.
 VarianceReport MeasureVariance(const RadianceField& source, const RadianceField& styled,
                                const LipschitzNetwork& network, const RayPairs& pairs,
                                const MarchOptions& march,
-                               const std::vector<float>* object_weights = nullptr);
+                               const std::vector<float>* object_weights = nullptr,
+                               RayWeigher* weigher = nullptr);
 
 }  // namespace regrade

@@ -77,7 +77,8 @@ struct StyleOptions {
          {.unit = "s",
           .help = "longest time that command:... may take for one view",
           .min = 0.1,
-          .max = 86400});
+          .max = 86400,
+          .constant = true});
   }
 };
 

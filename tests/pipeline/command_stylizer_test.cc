@@ -75,7 +75,7 @@ TEST(CommandStylizer, F55_WhatGoesWrongIsSaidWithTheProgramsWords) {
 
 TEST(CommandStylizer, F55_AProgramThatHangsIsEnded) {
   EXPECT_REGRADE_ERROR(Styled("env A={input} B={output} sleep 20", "s", 0.3),
-                       ExitCode::kExternalProgram, "--style-command-limit");
+                       ExitCode::kExternalProgram, "style-command-limit");
 }
 
 // What a program does is said in sh; {input} and {output} are its $1 and $2.
@@ -105,7 +105,7 @@ TEST(CommandStylizer, F55_IgnoredSigtermIsFollowedBySigkill) {
   const auto begin = std::chrono::steady_clock::now();
   EXPECT_REGRADE_ERROR(
       Styled(Script("trap \"\" TERM; for i in $(seq 400); do sleep 0.05; done"), "s", 0.3),
-      ExitCode::kExternalProgram, "--style-command-limit");
+      ExitCode::kExternalProgram, "style-command-limit");
   EXPECT_LT(std::chrono::steady_clock::now() - begin, std::chrono::seconds(12));
 }
 

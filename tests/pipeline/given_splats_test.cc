@@ -243,7 +243,7 @@ TEST(GivenSplats, PhotosWithPosesMeasureTheSplats) {
   std::vector<std::string> fit{"reconstruct", folder / "s/truth", "--out",
                                folder / "a",  "--device",         "cpu"};
   for (const char* flag : {"--photo-size", "64", "--splat-steps", "60", "--splats", "2",
-                           "--tracks", "given", "--scene-background", "0"})
+                           "--tracks", "given", "--config", R"({"scene-background": 0})"})
     fit.push_back(flag);
   ProgramOutcome done = Regrade(fit);
   ASSERT_EQ(done.code, 0) << done.text;
@@ -290,7 +290,7 @@ TEST(GivenSplats, WhatDoesNotFitIsRefused) {
   refuses(ball, {"--cameras", folder / "none"}, input, "no such folder or file");
   refuses(ball, {"--up", "z", "--cameras", folder / "other.json"}, usage, "--up and --cameras");
   refuses(ball, {"--splat-steps", "9"}, usage, "is not fitted");
-  refuses(ball, {"--sh-degree", "1"}, usage, "is not fitted");
+  refuses(ball, {"--fit-steps", "9"}, usage, "is not fitted");
   refuses(folder / "empty", {"--cameras", folder / "other.json"}, usage, "--cameras");
 }
 
