@@ -36,10 +36,12 @@ constexpr SceneSource kPhotos{
 
 // What decides a fit decides nothing here.
 void RefuseFlagsOfFits(const OptionSet& options) {
-  for (const FitKind* kind : FitKinds())
-    for (const auto& [name, value] : kind->options({}).AsObject())
+  for (const FitKind* kind : FitKinds()) {
+    const JsonValue of_fit = kind->options({});
+    for (const auto& [name, value] : of_fit.AsObject())
       if (options.Given(name))
         throw UsageError("a file of splats is not fitted", "--" + name, "leave it out");
+  }
 }
 
 void ProbeSplats(RunContext* context) {

@@ -26,7 +26,7 @@ namespace {
 namespace fs = std::filesystem;
 using testing::TemporaryFolder;
 
-constexpr int kViews = 9;
+constexpr int kViews = 12;
 
 bool HaveColmap() {
   try {
