@@ -22,8 +22,8 @@ constexpr double kMargin = 1.2;       // around an object: a film cuts corners
 constexpr double kPortrait = 0.85;    // of the distance: so much nearer shows an object upright
 constexpr double kFewestHoles = 0.6;  // quality of a view over the middle one
 constexpr double kFarFromBest = 0.45;  // worth of a view over the best one's
-// Of objects 1.2 to 2.6; a room whose walls look as well from behind has 1.02.
-constexpr double kObjectShowsMore = 1.1;
+// Of objects 1.09 to 2.3; a room whose walls look as well from behind has 1.02.
+constexpr double kObjectShowsMore = 1.05;
 // A middle of detail that is not clearly smaller than the whole adds no places.
 constexpr double kSameExtent = 0.85;
 // A view is too similar to another one within this part of the radius and this angle.
@@ -118,15 +118,15 @@ class Placement {
     return within;
   }
 
-  // Places around a middle at some distances, which look at it.
-  std::vector<Candidate> Around(const SplatExtent& extent,
+  // Places around a middle, at distances in units of its inner radius, which look at it.
+  std::vector<Candidate> Around(const SplatExtent& extent, const std::vector<double>& distances,
                                 const ProgressFunction& progress) const {
     constexpr int kDirections = 12;
     std::vector<Candidate> around;
     int done = 0;
-    for (const double distance : {0.7, 1.1, 1.7, 2.6, 4.0})
+    for (const double distance : distances)
       for (const double elevation : {-8.0, 8.0, 24.0, 45.0, 70.0}) {
-        ReportOrThrow(progress, done, 25);
+        ReportOrThrow(progress, done, 5.0 * static_cast<double>(distances.size()));
         const double turn = 0.5 * (done++ % 2);
         for (int i = 0; i < kDirections; ++i) {
           const Vec3d way =
@@ -269,18 +269,29 @@ PlacedViews PlaceViews(const Splats& splats, const FieldRenderer& renderer, cons
   ProgressParts parts(progress, 6);
   const std::vector<Candidate> rings = placement.Rings(parts.Next(0.5));
   std::vector<Candidate> all = placement.Within(parts.Next(1));
-  std::ranges::move(placement.Around(stage.extent, parts.Next(2.5)), std::back_inserter(all));
-  // Where photos went around a small part of what they show, that is where detail is.
-  if (const SplatExtent fine = ExtentOf(splats, SplatWeight::kDetail);
-      !(fine.inner > kSameExtent * stage.extent.inner))
-    std::ranges::move(placement.Around(fine, parts.Next(1)), std::back_inserter(all));
+  const auto add = [&](const SplatExtent& extent, const std::vector<double>& distances,
+                       double part) {
+    std::ranges::move(placement.Around(extent, distances, parts.Next(part)),
+                      std::back_inserter(all));
+  };
+  add(stage.extent, {0.7, 1.1, 1.7, 2.6}, 2);
   const double outside = ShownBy(rings, [](const Candidate&c) { return c.probe.Quality(); }),
                filled = ShownBy(all, [](const Candidate&c) { return c.filled; });
   const bool object = outside > kObjectShowsMore * filled;
-  std::vector<Candidate> chosen = object ? WithoutHoles(rings) : placement.Choose(all);
-  if (!object && chosen.size() < kMostPlacedViews) {  // good places are few: look beside them
-    std::ranges::move(placement.Beside(chosen, parts.Next(1)), std::back_inserter(all));
-    chosen = placement.Choose(std::move(all));
+  std::vector<Candidate> chosen;
+  if (object) {
+    chosen = WithoutHoles(rings);
+  } else {
+    add(stage.extent, {4.0}, 0.5);
+    // Where photos went around a small part of what they show, that is where detail is.
+    if (const SplatExtent fine = ExtentOf(splats, SplatWeight::kDetail);
+        !(fine.inner > kSameExtent * stage.extent.inner))
+      add(fine, {0.7, 1.1, 1.7, 2.6, 4.0}, 1);
+    chosen = placement.Choose(all);
+    if (chosen.size() < kMostPlacedViews) {  // good places are few: look beside them
+      std::ranges::move(placement.Beside(chosen, parts.Next(1)), std::back_inserter(all));
+      chosen = placement.Choose(std::move(all));
+    }
   }
   if (chosen.size() < 2 || !(std::max(outside, filled) > 0))
     throw InputError("no place shows the splats without holes", where,
