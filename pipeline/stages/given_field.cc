@@ -1,6 +1,7 @@
 #include "pipeline/stages/given_field.h"
 
 #include <algorithm>
+#include <filesystem>
 #include <string>
 #include <utility>
 
