@@ -62,7 +62,7 @@ void CopyPixels(const uint8_t* plane, int stride, float max, Image* image) {
 }  // namespace
 
 HeifPicture DecodeHeif(std::string_view bytes, const std::string& where,
-                       const HeifSizeCheck& check) {
+                       const PictureSizeCheck& check) {
   const auto require = [&](const heif_error& error) {
     if (error.code != heif_error_Ok)
       throw InputError(std::string("cannot read this HEIC or AVIF: ") +

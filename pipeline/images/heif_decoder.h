@@ -2,11 +2,11 @@
 #pragma once
 
 #include <cstdint>
-#include <functional>
 #include <string>
 #include <string_view>
 
 #include "kernels/scene/image.h"
+#include "pipeline/images/image_format.h"
 
 namespace regrade {
 
@@ -20,12 +20,8 @@ struct HeifPicture {
   int pictures = 1;                 // in the file; the primary one is decoded
 };
 
-// Gets width, height and bytes per pixel from the header, before pixels are allocated; throws
-// to refuse the file.
-using HeifSizeCheck = std::function<void(int64_t width, int64_t height, int64_t pixel_bytes)>;
-
 // Throws Error(kInput) for files that are damaged or that libheif here cannot decode.
 HeifPicture DecodeHeif(std::string_view bytes, const std::string& where,
-                       const HeifSizeCheck& check);
+                       const PictureSizeCheck& check);
 
 }  // namespace regrade

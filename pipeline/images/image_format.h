@@ -1,10 +1,17 @@
-// Recognises picture formats by the first bytes of a file.
+// Picture formats, recognised by the first bytes of a file.
 #pragma once
 
+#include <cstdint>
+#include <functional>
 #include <string>
 #include <string_view>
 
 namespace regrade {
+
+// Gets width, height and bytes per pixel from the header, before pixels are allocated; throws
+// to refuse the file.
+using PictureSizeCheck =
+    std::function<void(int64_t width, int64_t height, int64_t pixel_bytes)>;
 
 struct ImageFormat {
   const char* name;         // "JPEG", "HEIC", "camera raw", ...

@@ -142,7 +142,7 @@ class Decompressor {
 }  // namespace
 
 JpegPicture DecodeJpeg(std::string_view bytes, const std::string& where,
-                       const SizeCheck& check) {
+                       const PictureSizeCheck& check) {
   Decompressor jpeg;
   if (!jpeg.ReadHeader(bytes)) Refuse(jpeg, where);
   const int width = static_cast<int>(jpeg.info().image_width);

@@ -3,11 +3,11 @@
 #pragma once
 
 #include <cstdint>
-#include <functional>
 #include <string>
 #include <string_view>
 
 #include "kernels/scene/image.h"
+#include "pipeline/images/image_format.h"
 
 namespace regrade {
 
@@ -21,14 +21,10 @@ struct JpegPicture {
   std::string first_warning;
 };
 
-// Gets width, height and bytes per pixel from the header, before pixels are allocated; throws
-// to refuse the file.
-using SizeCheck = std::function<void(int64_t width, int64_t height, int64_t pixel_bytes)>;
-
 // Throws Error(kInput) for files that are no JPEG, are unsupported (12 bits) or have more than
 // kMaxJpegScans scans: each scan costs a pass over the whole picture.
 JpegPicture DecodeJpeg(std::string_view bytes, const std::string& where,
-                       const SizeCheck& check);
+                       const PictureSizeCheck& check);
 
 inline constexpr int kMaxJpegScans = 100;  // encoders write about 10
 

@@ -71,7 +71,7 @@ bool ReadChannels(OIIO::ImageInput* input, const OIIO::ImageSpec& spec, float ma
 class Module : public OiioModule {
  public:
   StoredPicture Read(const ImageFormat& format, std::string_view bytes, const std::string& path,
-                     const PngSizeCheck& check) const override {
+                     const PictureSizeCheck& check) const override {
     const auto refuse = [&](const std::string& why) {
       throw InputError(std::string("cannot read this ") + format.name + ": " + why, path,
                        format.remedy);

@@ -2,13 +2,13 @@
 // brings more than 200 libraries.
 #pragma once
 
+#include <cstdint>
 #include <string>
 #include <string_view>
 
 #include "kernels/process/program_module.h"
 #include "pipeline/images/image_format.h"
 #include "pipeline/images/normalize_photo.h"
-#include "pipeline/images/png_decoder.h"
 
 namespace regrade {
 
@@ -18,7 +18,7 @@ class OiioModule {
 
   // A file in one of the formats that have no decoder of our own. Throws Error(kInput).
   virtual StoredPicture Read(const ImageFormat& format, std::string_view bytes,
-                             const std::string& path, const PngSizeCheck& check) const = 0;
+                             const std::string& path, const PictureSizeCheck& check) const = 0;
   // Metadata of an EXIF block, a TIFF without its picture.
   virtual void TakeExif(std::string_view exif, StoredPicture* picture) const = 0;
   // RGB with 16 bits a channel, deflated, tagged as sRGB; `values` are 3 a pixel. Returns why

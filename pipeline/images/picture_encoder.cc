@@ -8,26 +8,14 @@
 #include <jpeglib.h>
 #include <png.h>
 
-#include <algorithm>
 #include <bit>
 #include <cstdint>
-#include <limits>
 #include <vector>
 
 #include "kernels/base/error.h"
 
 namespace regrade {
 namespace {
-
-template <typename Value>
-std::vector<Value> Quantized(const Image& image) {
-  constexpr float kMax = std::numeric_limits<Value>::max();
-  std::vector<Value> values(image.pixels.size());
-  std::transform(image.pixels.begin(), image.pixels.end(), values.begin(), [](float v) {
-    return v > 0 ? static_cast<Value>(std::min(v, 1.f) * kMax + 0.5f) : Value{0};
-  });
-  return values;
-}
 
 // An EXIF block whose one entry is the colour space: 1, sRGB (EXIF 2.3, 4.6.5).
 constexpr unsigned char kSrgbExif[] = {

@@ -133,7 +133,7 @@ std::string_view ChunkOf(std::string_view bytes, std::string_view name) {
 }  // namespace
 
 PngPicture DecodePng(std::string_view bytes, const std::string& where,
-                     const PngSizeCheck& check) {
+                     const PictureSizeCheck& check) {
   PngRows png(bytes);
   const auto refuse = [&] {
     throw InputError(std::string("cannot read this PNG: ") + png.failure(), where,

@@ -2,11 +2,11 @@
 #pragma once
 
 #include <cstdint>
-#include <functional>
 #include <string>
 #include <string_view>
 
 #include "kernels/scene/image.h"
+#include "pipeline/images/image_format.h"
 
 namespace regrade {
 
@@ -21,13 +21,9 @@ struct PngPicture {
   std::string first_remark;
 };
 
-// Gets width, height and bytes per pixel from the header, before pixels are allocated; throws
-// to refuse the file.
-using PngSizeCheck = std::function<void(int64_t width, int64_t height, int64_t pixel_bytes)>;
-
 // Every chunk up to IEND must be whole and have the right checksum; bytes after IEND are
 // ignored. Throws Error(kInput) otherwise, and for files that libpng cannot decode.
 PngPicture DecodePng(std::string_view bytes, const std::string& where,
-                     const PngSizeCheck& check);
+                     const PictureSizeCheck& check);
 
 }  // namespace regrade

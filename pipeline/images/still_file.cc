@@ -1,6 +1,5 @@
 #include "pipeline/images/still_file.h"
 
-#include <algorithm>
 #include <cstdint>
 #include <filesystem>
 #include <vector>
@@ -14,12 +13,7 @@ namespace regrade {
 namespace {
 
 void WriteTiff(const std::string& path, const Image& image) {
-  std::vector<uint16_t> values(image.pixels.size());
-  for (size_t i = 0; i < values.size(); ++i) {
-    const float v = image.pixels[i];
-    // NaN becomes 0.
-    values[i] = static_cast<uint16_t>((v > 0 ? std::min(v, 1.0f) : 0.0f) * 65535.f + 0.5f);
-  }
+  const std::vector<uint16_t> values = Quantized<uint16_t>(image);
   const std::string temporary = path + kTemporarySuffix;
   const std::string why = Oiio().WriteTiff(temporary, image.width, image.height, values.data());
   if (!why.empty()) {

@@ -22,8 +22,8 @@ constexpr double kMargin = 1.2;       // around an object: a film cuts corners
 constexpr double kPortrait = 0.85;    // of the distance: so much nearer shows an object upright
 constexpr double kFewestHoles = 0.6;  // quality of a view over the middle one
 constexpr double kFarFromBest = 0.45;  // worth of a view over the best one's
-// Of objects 1.09 to 2.3; a room whose walls look as well from behind has 1.02.
-constexpr double kObjectShowsMore = 1.05;
+// A thin margin: objects have 1.09 to 2.3, a room whose walls look as well from behind 1.05.
+constexpr double kObjectShowsMore = 1.065;
 // A middle of detail that is not clearly smaller than the whole adds no places.
 constexpr double kSameExtent = 0.85;
 // A view is too similar to another one within this part of the radius and this angle.
