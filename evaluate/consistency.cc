@@ -107,7 +107,7 @@ PairResult ComparePair(const Image& at, const Image& warped, const PairMotion& m
         ++row.unmasked;
       }
       if (!(weight > 0)) continue;
-      row.squared_error += weight * squared;
+      row.squared_error += weight * weight * squared;  // the mask is within the norm
       row.weight += weight;
     }
     return row;

@@ -19,7 +19,7 @@ struct PairResult {
   std::string sequence;
   int from = 0, to = 0;  // frame indices
 
-  // EQ(tc-psnr), Lai et al. 2018: e = sum_x M(x) |O_b(x + f(x)) - O_a(x)|^2 / (C sum_x M(x)),
+  // EQ(tc-psnr), Lai et al. 2018: e = sum_x |M(x) (O_b(x + f(x)) - O_a(x))|^2 / (C sum_x M(x)),
   // the mean squared error over trusted pixels x of frame a and the C = 3 colour channels. f
   // and M are flow from a to b and mask of the reference frames; O is sampled bilinearly with
   // repeated border, values as given (white = 1, not clipped). b is the frame that is warped:

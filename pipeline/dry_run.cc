@@ -72,8 +72,9 @@ void SayPaperConfig(RunContext* context) {
                          (asked ? ", as --paper-config says"
                                 : ", unless the photos are transparent (syn) or all look one "
                                   "way (llff)"));
-  for (const std::string& difference : NotToTheLetter(name, DecidedValues(settings)))
-    context->console->Info("not to the letter: " + difference);
+  for (const JsonValue& values : {DecidedValues(settings), StyleValues(settings)})
+    for (const std::string& difference : NotToTheLetter(name, values))
+      context->console->Info("not to the letter: " + difference);
 }
 
 }  // namespace

@@ -3,7 +3,7 @@
 #
 #   gpu_check.sh bundle DIR [FILE.npz...]   on the build machine: writes to DIR the programs (for sm_90, or for
 #                                           REGRADE_CUDA_ARCH), their libraries beyond glibc, and packed captures
-#   gpu_check.sh run DIR [OUT]              on the machine with the GPU, which needs only a CUDA driver; with
+#   gpu_check.sh run DIR [OUT]              on the machine with the GPU, which needs a CUDA driver; with
 #                                           compute-sanitizer on its PATH, small scenes run under its four tools;
 #                                           with ncu, the kernels of one small fit, restyling and frame are measured
 #   gpu_check.sh repeat DIR CAPTURE [OUT]   there, too: fits and restyles a capture that was packed with a style three

@@ -8,7 +8,7 @@ namespace regrade {
 RayWeights DeviceRayWeigher::Weigh(const ViewRays& rays, int64_t begin, int64_t end) {
   const int64_t n = end - begin;
   DeviceSplatSamples device;
-  weigher_.Weigh({{&rays, begin, end}}, n, min_weight_, &device);
+  weigher_.Weigh({{&rays, begin, end}}, n, min_weight, &device);
   std::vector<SplatSample> samples(static_cast<size_t>(device.most));
   device.sample.CopyOut(samples.data(), device.most);
   RayWeights result;

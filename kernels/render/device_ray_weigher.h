@@ -8,16 +8,16 @@ namespace regrade {
 
 class DeviceRayWeigher : public RayWeigher {
  public:
-  // `weigher` must outlive it. Samples that weigh at most min_weight are dropped.
-  DeviceRayWeigher(DeviceSplatWeigher* weigher, float min_weight)
-      : weigher_(*weigher), min_weight_(min_weight) {}
+  // `weigher` must outlive it.
+  DeviceRayWeigher(DeviceSplatWeigher* weigher, float least_weight) : weigher_(*weigher) {
+    min_weight = least_weight;
+  }
 
   using RayWeigher::Weigh;
   RayWeights Weigh(const ViewRays& rays, int64_t begin, int64_t end) override;
 
  private:
   DeviceSplatWeigher& weigher_;
-  float min_weight_;
 };
 
 }  // namespace regrade

@@ -7,8 +7,9 @@ namespace regrade {
 std::unique_ptr<RayWeigher> MakeRayWeigher(const Geometry& geometry, float near_clip,
                                            const MarchOptions& march, float min_weight,
                                            int64_t kept_bytes) {
-  return RenderKindOf(geometry).make_weigher(geometry, near_clip, march, min_weight,
-                                             kept_bytes);
+  auto weigher = RenderKindOf(geometry).make_weigher(geometry, near_clip, march, kept_bytes);
+  weigher->min_weight = min_weight;
+  return weigher;
 }
 
 std::vector<double> RayDepths(const RadianceField& field, const ViewRays& rays,

@@ -16,8 +16,11 @@ class RayWeigher {
  public:
   virtual ~RayWeigher() = default;
 
-  // Of rays [begin, end). Exact, and in the order of light; samples that weigh at most the
-  // least weight are dropped. The same for any number of threads. One call at a time.
+  // Samples that weigh at most this are dropped. It may change between calls.
+  float min_weight = 0;
+
+  // Of rays [begin, end). Exact, and in the order of light. The same for any number of threads.
+  // One call at a time.
   virtual RayWeights Weigh(const ViewRays& rays, int64_t begin, int64_t end) = 0;
   RayWeights Weigh(const ViewRays& rays) { return Weigh(rays, 0, rays.size()); }
 };
@@ -35,8 +38,7 @@ std::unique_ptr<RayWeigher> MakeRayWeigher(const Geometry& geometry, float near_
                                            int64_t kept_bytes = 0);
 
 // [rays]: depth along the camera's optical axis of what each ray meets (of splats the median),
-// 0 where that is less than half of its light. `weigher`: of the field, with the least weight
-// 0.
+// 0 where that is less than half of its light. `weigher`: of the field, with min_weight 0.
 std::vector<double> RayDepths(const RadianceField& field, const ViewRays& rays,
                               const MarchOptions& march, RayWeigher* weigher);
 

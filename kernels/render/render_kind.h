@@ -15,8 +15,7 @@ struct RenderKind {
   std::unique_ptr<KindRenderer> (*make_renderer)(const RadianceField& field, Backend backend);
   // See MakeRayWeigher, RayDepths and OpticalDepths.
   std::unique_ptr<RayWeigher> (*make_weigher)(const Geometry& geometry, float near_clip,
-                                              const MarchOptions& march, float min_weight,
-                                              int64_t kept_bytes);
+                                              const MarchOptions& march, int64_t kept_bytes);
   std::vector<double> (*ray_depths)(const RadianceField& field, const ViewRays& rays,
                                     const MarchOptions& march, RayWeigher* weigher);
   std::vector<double> (*optical_depths)(const RadianceField& field,

@@ -63,12 +63,10 @@ int64_t SplatWeigher::TileLists::bytes() const {
   return static_cast<int64_t>(first.size() * sizeof(int64_t) + splat.size() * sizeof(int32_t));
 }
 
-SplatWeigher::SplatWeigher(const Geometry& geometry, float near_clip, float min_weight,
-                           int64_t kept_bytes)
+SplatWeigher::SplatWeigher(const Geometry& geometry, float near_clip, int64_t kept_bytes)
     : splats_(SplatsWithoutColors(geometry.splats)),
       options_(
           SplatOptionsFor(near_clip, geometry.frame.radius, double{geometry.splats.fit_pixel})),
-      min_weight_(min_weight),
       left_bytes_(kept_bytes) {}
 
 std::shared_ptr<const SplatWeigher::TileLists> SplatWeigher::ListsOf(const Camera& camera) {
@@ -121,7 +119,7 @@ void SplatWeigher::WeighGroup(const ViewRays& rays, int64_t begin, Group* group,
           HitSplatAt(splat.ellipse, splat.log_opacity, splat.reach, place.u, place.v, &hit)) {
         const float weight = state.transmittance * hit.alpha;
         if (!CompositeSplat(hit.alpha, Vec3f{}, 0.0f, &state)) continue;
-        if (weight > min_weight_) {
+        if (weight > min_weight) {
           group->samples.push_back({k, {0, 0, 0}, weight});
           group->directions.push_back(direction);
           group->ray.push_back(i);
@@ -201,9 +199,8 @@ RayWeights SplatWeigher::Weigh(const ViewRays& rays, int64_t begin, int64_t end)
 }
 
 std::unique_ptr<RayWeigher> MakeSplatWeigher(const Geometry& geometry, float near_clip,
-                                             const MarchOptions&, float min_weight,
-                                             int64_t kept_bytes) {
-  return std::make_unique<SplatWeigher>(geometry, near_clip, min_weight, kept_bytes);
+                                             const MarchOptions&, int64_t kept_bytes) {
+  return std::make_unique<SplatWeigher>(geometry, near_clip, kept_bytes);
 }
 
 std::vector<double> SplatDepths(const RadianceField& field, const ViewRays& rays,

@@ -14,7 +14,7 @@ namespace regrade {
 class SplatWeigher : public RayWeigher {
  public:
   // See MakeRayWeigher.
-  SplatWeigher(const Geometry& geometry, float near_clip, float min_weight, int64_t kept_bytes);
+  SplatWeigher(const Geometry& geometry, float near_clip, int64_t kept_bytes);
 
   RayWeights Weigh(const ViewRays& rays, int64_t begin, int64_t end) override;
 
@@ -43,7 +43,6 @@ class SplatWeigher : public RayWeigher {
 
   SplatsView<float> splats_;  // without colours
   SplatOptions options_;
-  float min_weight_;
   int64_t left_bytes_;
   std::vector<std::shared_ptr<const TileLists>> kept_;
   std::shared_ptr<const TileLists> last_;
@@ -51,8 +50,7 @@ class SplatWeigher : public RayWeigher {
 
 // See MakeRayWeigher and RayDepths.
 std::unique_ptr<RayWeigher> MakeSplatWeigher(const Geometry& geometry, float near_clip,
-                                             const MarchOptions& march, float min_weight,
-                                             int64_t kept_bytes);
+                                             const MarchOptions& march, int64_t kept_bytes);
 std::vector<double> SplatDepths(const RadianceField& field, const ViewRays& rays,
                                 const MarchOptions& march, RayWeigher* weigher);
 

@@ -8,20 +8,18 @@ namespace {
 
 class VoxelWeigher : public RayWeigher {
  public:
-  VoxelWeigher(const Geometry& geometry, float near_clip, const MarchOptions& march,
-               float min_weight)
-      : geometry_(geometry), near_clip_(near_clip), march_(march), min_weight_(min_weight) {}
+  VoxelWeigher(const Geometry& geometry, float near_clip, const MarchOptions& march)
+      : geometry_(geometry), near_clip_(near_clip), march_(march) {}
 
   RayWeights Weigh(const ViewRays& rays, int64_t begin, int64_t end) override {
     return ComputeRayWeights(geometry_, {rays.rays.data() + begin, end - begin}, march_,
-                             near_clip_, min_weight_);
+                             near_clip_, min_weight);
   }
 
  private:
   const Geometry& geometry_;
   float near_clip_;
   MarchOptions march_;
-  float min_weight_;
 };
 
 double VoxelDepth(const FieldView<float>& field, const Camera& camera, const Ray& ray,
@@ -36,9 +34,8 @@ double VoxelDepth(const FieldView<float>& field, const Camera& camera, const Ray
 }  // namespace
 
 std::unique_ptr<RayWeigher> MakeVoxelWeigher(const Geometry& geometry, float near_clip,
-                                             const MarchOptions& march, float min_weight,
-                                             int64_t) {
-  return std::make_unique<VoxelWeigher>(geometry, near_clip, march, min_weight);
+                                             const MarchOptions& march, int64_t) {
+  return std::make_unique<VoxelWeigher>(geometry, near_clip, march);
 }
 
 std::vector<double> VoxelDepths(const RadianceField& field, const ViewRays& rays,

@@ -11,8 +11,7 @@ namespace regrade {
 
 // See MakeRayWeigher and RayDepths; nothing is kept, and depths need no weigher.
 std::unique_ptr<RayWeigher> MakeVoxelWeigher(const Geometry& geometry, float near_clip,
-                                             const MarchOptions& march, float min_weight,
-                                             int64_t kept_bytes);
+                                             const MarchOptions& march, int64_t kept_bytes);
 std::vector<double> VoxelDepths(const RadianceField& field, const ViewRays& rays,
                                 const MarchOptions& march, RayWeigher* weigher);
 

@@ -192,10 +192,13 @@ struct StylizeReport {
   // Of neighbouring pixels of a view, and of pixels of two views that see one point.
   std::optional<VarianceMetrics> variance, variance_across_views;
   std::vector<std::string> notices;  // about the colour map and the training
+  // Options of the recipe and of the protocol, if the preset is that of the paper.
+  std::optional<std::vector<std::string>> not_to_the_letter;
 
   template <typename Visit>
   void Describe(Visit& visit) {
     visit("device", device, {.optional = true});
+    visit("not_to_the_letter", not_to_the_letter, {.label = "not to the letter"});
     visit("steps", steps, {.label = "steps"});
     visit("rejected_steps", rejected_steps);
     visit("psnr_train_db", psnr_train_db, {.label = "PSNR, training", .unit = "dB"});

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <iterator>
 
+#include "evaluate/protocols.h"
 #include "kernels/base/error.h"
 
 namespace regrade {
@@ -164,6 +165,13 @@ JsonValue PaperValues(const std::string& name) {
   return DecidedValues(settings);
 }
 
+JsonValue StyleValues(const RunSettings& settings) {
+  JsonValue values = OptionValues(settings.network);
+  const JsonValue evaluated = OptionValues(settings.consistency);
+  for (const char* option : {"mode", "gaps", "warp"}) values[option] = evaluated.At(option);
+  return values;
+}
+
 PaperChoice ChoosePaperConfig(const std::string& asked, const PaperTraits& traits) {
   if (asked == "syn" && !traits.transparent)
     throw UsageError("syn needs photos with transparent parts, and these have none",
@@ -197,7 +205,13 @@ void ApplyPaperChoice(const PaperChoice& choice, OptionSet* options) {
 
 std::vector<std::string> NotToTheLetter(const std::string& name, const JsonValue& values) {
   std::vector<std::string> differences;
-  const JsonValue all = PaperValues(name);
+  RunSettings letter;
+  UsePaperConfig(name, &letter);
+  ApplyStyleRecipe("paper", &letter.network);
+  UseProtocol("liprf", &letter.consistency);
+  JsonValue all = DecidedValues(letter);
+  const JsonValue style = StyleValues(letter);
+  for (const auto& [option, published] : style.AsObject()) all[option] = published;
   for (const auto& [option, published] : all.AsObject()) {
     const JsonValue* const value = values.Find(option);
     if (value != nullptr && !(*value == published))

@@ -21,6 +21,9 @@ void UsePaperConfig(const std::string& name, RunSettings* settings);
 JsonValue DecidedValues(const RunSettings& settings);
 JsonValue PaperValues(const std::string& name);
 
+// {"name": value} of what LipRF's recipe and its protocol decide, the same for all of them.
+JsonValue StyleValues(const RunSettings& settings);
+
 // What the choice depends on; see paper_traits.h.
 struct PaperTraits {
   bool transparent = false, forward_facing = false;
@@ -41,7 +44,8 @@ void CheckPaper(const std::string& preset, const std::string& config);
 // it, or where its value is not the base's: it was asked for.
 void ApplyPaperChoice(const PaperChoice& choice, OptionSet* options);
 
-// "fit-rays is 64, published 5000" for each value that is not the configuration's.
+// "fit-rays is 64, published 5000" for each of `values` that is neither the configuration's nor,
+// of StyleValues, the recipe's and the protocol's.
 std::vector<std::string> NotToTheLetter(const std::string& name, const JsonValue& values);
 
 }  // namespace regrade

@@ -14,6 +14,7 @@
 #include "pipeline/images/image_file.h"
 #include "pipeline/program/device_choice.h"
 #include "pipeline/report/stage_metrics.h"
+#include "pipeline/run/paper_config.h"
 #include "pipeline/run/run_context.h"
 #include "pipeline/stages/make_stylizer.h"
 #include "pipeline/stages/object_edit.h"
@@ -50,20 +51,19 @@ VarianceMetrics MetricsOfVariance(const VarianceReport& report) {
 }
 
 void SetVariance(const RestyledField& restyled, const std::vector<StyledTrainingView>& views,
-                 uint64_t seed, const std::vector<float>* object_weights,
+                 uint64_t seed, const std::vector<float>* object_weights, RayWeigher* weigher,
                  StylizeReport* metrics) {
   std::vector<Camera> cameras;
   for (const StyledTrainingView& view : views) cameras.push_back(view.camera);
   const RadianceField& source = restyled.source;
   const MarchOptions march{source.step};
-  const auto weigher = MakeRayWeigher(*source.geometry, source.near_clip, march, 0, kManyViews);
   const auto measure = [&](const RayPairs& pairs) {
     return MetricsOfVariance(MeasureVariance(source, restyled.styled, restyled.trained.network,
-                                             pairs, march, object_weights, weigher.get()));
+                                             pairs, weigher, object_weights));
   };
   metrics->variance = measure(NeighbouringPixels(cameras, kVariancePairs, seed));
   metrics->variance_across_views =
-      measure(PixelsOfOnePoint(source, cameras, kVariancePairs, seed, march, weigher.get()));
+      measure(PixelsOfOnePoint(source, cameras, kVariancePairs, seed, march, weigher));
 }
 
 // Why the local Lipschitz constant is above what the colours' covariances predict, where it is.
@@ -113,8 +113,8 @@ StyleTargets ReadStyleTargets(const Workspace& folder, const WorkingViews& views
   return targets;
 }
 
-StylizeReport MetricsOfTraining(const TrainNetworkResult& trained) {
-  StylizeReport metrics;
+// `metrics` has what was checked.
+StylizeReport MetricsOfTraining(const TrainNetworkResult& trained, StylizeReport metrics) {
   metrics.steps = trained.steps;
   metrics.rejected_steps = trained.rejected_steps;
   metrics.k_est = trained.k_est;
@@ -164,7 +164,12 @@ StageOutcome Stylize(RunContext* context, const JsonValue& inputs,
     resume = UnpackTrainingState(*bytes);
   if (resume) context->console->Info("stylize: continues from its checkpoint");
   request.resume = resume ? &*resume : nullptr;
-  RestyledField restyled = Restyle(std::move(stored.field), targets.targets(), request, hooks);
+  StylizeReport checked;
+  hooks.check = [&](const RestyledField& restyled, RayWeigher* weigher) {
+    SetVariance(restyled, targets.targets().views(), settings.run.seed, request.object_weights,
+                weigher, &checked);
+  };
+  const RestyledField restyled = Restyle(std::move(stored.field), targets.targets(), request, hooks);
   const TrainNetworkResult& trained = restyled.trained;
   for (const std::string& notice : restyled.notices) context->console->Info(notice);
   for (const std::string& warning : trained.warnings) context->console->Warn(warning);
@@ -172,7 +177,7 @@ StageOutcome Stylize(RunContext* context, const JsonValue& inputs,
   const StoredNetwork network{trained.network, trained.k_est, restyled.styled.background};
   WriteNetworkFile(workspace.Path("network.npz"), network);
   StageOutcome outcome;
-  StylizeReport metrics = MetricsOfTraining(trained);
+  StylizeReport metrics = MetricsOfTraining(trained, std::move(checked));
   outcome.outputs = {"network.npz"};
   std::filesystem::remove(workspace.Path("residual.npz"));  // of an earlier style
   if (settings.residual.On()) {
@@ -190,14 +195,17 @@ StageOutcome Stylize(RunContext* context, const JsonValue& inputs,
   } else {
     std::filesystem::remove(workspace.Path("object.npz"));  // of an earlier style
   }
-  SetVariance(restyled, targets.targets().views(), settings.run.seed, request.object_weights,
-              &metrics);
   metrics.device = DeviceName(request.backend);
   metrics.notices = restyled.notices;
   for (const std::string& warning : trained.warnings) metrics.notices.push_back(warning);
   if (const std::string why = WhySteep(trained); !why.empty()) {
     context->console->Detail(why);
     metrics.notices.push_back(why);
+  }
+  if (settings.run.preset == "paper") {
+    metrics.not_to_the_letter = NotToTheLetter(kPaperBase, StyleValues(settings));
+    for (const std::string& difference : *metrics.not_to_the_letter)
+      context->console->Info("not to the letter: " + difference);
   }
   PutMetrics(metrics, &outcome.metrics);
   return outcome;

@@ -65,11 +65,6 @@ RayPairs PixelsOfOnePoint(const RadianceField& field, const std::vector<Camera>&
                           RayWeigher* weigher) {
   RayPairs pairs{.cameras = cameras};
   if (cameras.size() < 2) return pairs;
-  std::unique_ptr<RayWeigher> own;
-  if (weigher == nullptr) {
-    own = MakeRayWeigher(*field.geometry, field.near_clip, march, 0, kManyViews);
-    weigher = own.get();
-  }
   for (int round = 0; round < kTries && pairs.size() < 2 * count; ++round) {
     ViewRays from{.cameras = cameras}, to{.cameras = cameras};
     for (int64_t i = 0; i < count; ++i) {

@@ -24,10 +24,9 @@ RayPairs NeighbouringPixels(const std::vector<Camera>& cameras, int64_t count, u
 // EQ(geometric-flow). The point must lie in the next view's frame, and that ray's own depth be
 // within 1 % of the point's, as the evaluator asks. Rays that let more light pass than they
 // meet have no depth. Fewer than two cameras have no pairs. The same for any number of threads.
-// `weigher`: of the field, exact, with the least weight 0, to share among calls; null makes
-// one.
+// `weigher`: of the field, with min_weight 0.
 RayPairs PixelsOfOnePoint(const RadianceField& field, const std::vector<Camera>& cameras,
                           int64_t count, uint64_t seed, const MarchOptions& march,
-                          RayWeigher* weigher = nullptr);
+                          RayWeigher* weigher);
 
 }  // namespace regrade

@@ -249,13 +249,11 @@ void Add(double source, double styled, double k, VarianceGroup* group) {
 
 VarianceReport MeasureVariance(const RadianceField& source, const RadianceField& styled,
                                const LipschitzNetwork& network, const RayPairs& pairs,
-                               const MarchOptions& march,
-                               const std::vector<float>* object_weights, RayWeigher* weigher) {
+                               RayWeigher* weigher,
+                               const std::vector<float>* object_weights) {
   if (object_weights != nullptr)
     REGRADE_CHECK_EQ(std::ssize(*object_weights), source.geometry->num_voxels());
-  std::unique_ptr<RayWeigher> own;
-  if (weigher == nullptr) own = MakeRayWeigher(*source.geometry, source.near_clip, march);
-  const RayWeights weights = (own != nullptr ? own.get() : weigher)->Weigh(pairs);
+  const RayWeights weights = weigher->Weigh(pairs);
   const Observer observer(source, styled, network, object_weights);
   struct Result {
     double source, styled, fraction;

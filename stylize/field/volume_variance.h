@@ -70,8 +70,7 @@ inline constexpr double kTransparentTransmittance = 1e-2;  // more than that is 
 // result does not depend on the number of threads. `weigher`: as of PixelsOfOnePoint.
 VarianceReport MeasureVariance(const RadianceField& source, const RadianceField& styled,
                                const LipschitzNetwork& network, const RayPairs& pairs,
-                               const MarchOptions& march,
-                               const std::vector<float>* object_weights = nullptr,
-                               RayWeigher* weigher = nullptr);
+                               RayWeigher* weigher,
+                               const std::vector<float>* object_weights = nullptr);
 
 }  // namespace regrade

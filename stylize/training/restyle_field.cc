@@ -46,6 +46,10 @@ RestyledField Restyle(RadianceField field, const TrainingTargets& targets,
   if (request.object_weights != nullptr)
     result.styled = MixFields(result.source, {&result.styled}, {1}, request.object_weights);
   finished(Part::kApplication);
+  if (hooks.check) {
+    engine->weigher()->min_weight = 0;
+    hooks.check(result, engine->weigher());
+  }
   return result;
 }
 

@@ -8,6 +8,7 @@
 
 #include "kernels/device/backend.h"
 #include "kernels/field/radiance_field.h"
+#include "kernels/render/ray_weigher.h"
 #include "stylize/training/train_network.h"
 #include "stylize/training/training_targets.h"
 
@@ -26,18 +27,20 @@ struct RestyleRequest {
   const TrainingState* resume = nullptr;  // see TrainNetwork
 };
 
-struct RestyleHooks {
-  TrainingHooks training;  // its progress is that of all parts
-  // Called when the field is where it is trained, after training, and at the end.
-  enum class Part { kUpload, kTraining, kApplication };
-  std::function<void(Part)> finished;
-};
-
 struct RestyledField {
   RadianceField source;  // padded to kStyledBasis
   RadianceField styled;
   TrainNetworkResult trained;
   std::vector<std::string> notices;  // of the scene-wide map
+};
+
+struct RestyleHooks {
+  TrainingHooks training;  // its progress is that of all parts
+  // Called when the field is where it is trained, after training, and at the end.
+  enum class Part { kUpload, kTraining, kApplication };
+  std::function<void(Part)> finished;
+  // Called at the end with a weigher of the field, of min_weight 0, which knows the views.
+  std::function<void(const RestyledField&, RayWeigher*)> check;
 };
 
 // `targets` must not be empty. Throws what TrainNetwork throws, and Error(kResources) where

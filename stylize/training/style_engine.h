@@ -45,7 +45,7 @@ class StyleEngine {
   virtual ~StyleEngine() = default;
 
   virtual StyleLoss* loss() = 0;
-  // Of the field, with the loss's min_weight; not after Restyle.
+  // Of the field, with the loss's min_weight.
   virtual RayWeigher* weigher() = 0;
   virtual int steps_per_call() const = 0;  // largest size of StepRequest::batches
   // Power iteration, loss and gradient, UpdateWeights. `update` is the same in every call.

@@ -105,7 +105,7 @@ Plane LiteralRuder(const FlowField& forward, const FlowField& backward) {
   return weight;
 }
 
-// The pair error of Lai et al., also for soft weights.
+// The pair error of Lai et al., whose program squares the masked difference.
 double LiteralError(const Plane& mask, const Image& a, const Image& b, const FlowField& flow) {
   const Plane fu = Component(flow, 0), fv = Component(flow, 1);
   double numerator = 0, denominator = 0;
@@ -115,7 +115,7 @@ double LiteralError(const Plane& mask, const Image& a, const Image& b, const Flo
     for (int y = 0; y < a.height; ++y)
       for (int x = 0; x < a.width; ++x) {
         const double d = Lookup(pb, x + fu[y][x], y + fv[y][x]) - pa[y][x];
-        numerator += mask[y][x] * d * d;
+        numerator += mask[y][x] * mask[y][x] * d * d;
         denominator += mask[y][x];
       }
   }

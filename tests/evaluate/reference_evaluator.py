@@ -2,14 +2,14 @@
 """Measures the temporal consistency of frames in numpy, as an independent check of `regrade evaluate`.
 
   reference_evaluator.py --frames DIR --flow DIR [--mode lai2018|ruder2016] [--gaps 1,5]
-                         [--warp later|earlier] [--error-per channel|pixel] [--as-published]
+                         [--warp later|earlier] [--error-per channel|pixel]
 
 The DIR of --frames has 8-bit PNG or PPM files in natural order, the DIR of --flow the files 00000_00001.flo (motion from
 frame 0 to frame 1) and 00001_00000.flo (backward). Prints one JSON object. Shares no code with the program.
 
-The program differs from the published definitions in three points, which are followed here unless --as-published is
-given: pairs without a trusted pixel are undefined (Lai et al.: error 0); non-finite flow is not trusted; in mode
-ruder2016 a pixel whose target is outside the frame keeps weight 0 after the smoothing. Exit status: 0.
+Three points depart from the published definitions, as in the program: pairs without a trusted pixel are undefined
+(Lai et al.: error 0); non-finite flow is not trusted; in mode ruder2016 a pixel whose target is outside the frame
+keeps weight 0 after the smoothing. Exit status: 0.
 """
 
 import argparse
@@ -121,7 +121,7 @@ def finite(vectors):
     return numpy.isfinite(vectors).all(axis=2)
 
 
-def mask_lai2018(forward, backward, as_published):
+def mask_lai2018(forward, backward):
     """Lai et al. 2018: hard mask, forward differences, targets out of the frame are kept."""
     back = bilinear(backward, *targets(forward))
     occluded = squared(back + forward) > 0.01 * (squared(back) + squared(forward)) + 0.5
@@ -130,7 +130,7 @@ def mask_lai2018(forward, backward, as_published):
     energy[:-1, :] += squared(forward[1:, :] - forward[:-1, :])
     boundary = energy > 0.01 * squared(forward) + 0.002
     mask = (~occluded & ~boundary).astype(float)
-    return mask if as_published else mask * (finite(forward) & finite(back))
+    return mask * (finite(forward) & finite(back))
 
 
 def smoothed(values):
@@ -143,7 +143,7 @@ def smoothed(values):
     return values
 
 
-def mask_ruder2016(forward, backward, as_published):
+def mask_ruder2016(forward, backward):
     """Ruder et al. 2016: soft mask, central differences, smoothed from -255, 0 and 255."""
     height, width = forward.shape[:2]
     x, y = targets(forward)
@@ -158,19 +158,19 @@ def mask_ruder2016(forward, backward, as_published):
     sampled = inside & finite(forward) & finite(back)
     values = numpy.where(~sampled, 0, numpy.where(disoccluded, -255, numpy.where(boundary, 0, 255)))
     weight = numpy.clip(smoothed(values.astype(float)), 0, 255) / 255
-    return weight if as_published else weight * sampled
+    return weight * sampled
 
 
 MASKS = {"lai2018": mask_lai2018, "ruder2016": mask_ruder2016}
 
 
-def compare(fixed, moved, flow, mask, error_per, as_published):
+def compare(fixed, moved, flow, mask, error_per):
     """(mean squared error over trusted pixels of `fixed`, fraction of trusted pixels)"""
     # Pixels of weight 0 are ignored, even if their target is unknown.
     warped = numpy.where(mask[:, :, None] > 0, bilinear(moved, *targets(flow)), fixed)
-    total = (mask[:, :, None] * (warped - fixed) ** 2).sum()
+    total = ((mask[:, :, None] * (warped - fixed)) ** 2).sum()
     if mask.sum() == 0:
-        return (0.0 if as_published else None), 0.0
+        return None, 0.0
     return total / ((fixed.shape[2] if error_per == "channel" else 1) * mask.sum()), mask.mean()
 
 
@@ -178,15 +178,15 @@ def decibel(error):
     return None if error is None else float("inf") if error == 0 else -10 * numpy.log10(error)
 
 
-def evaluate(frames, flow_folder, mode, gaps, warp, error_per, as_published):
+def evaluate(frames, flow_folder, mode, gaps, warp, error_per):
     pairs = []
     for gap in gaps:
         for i in range(len(frames) - gap):
             fixed, moved = (i, i + gap) if warp == "later" else (i + gap, i)
             there, back = read_flow(flow_folder, fixed, moved), read_flow(flow_folder, moved, fixed)
             with numpy.errstate(invalid="ignore"):
-                mask = MASKS[mode](there, back, as_published)
-            error, coverage = compare(frames[fixed], frames[moved], there, mask, error_per, as_published)
+                mask = MASKS[mode](there, back)
+            error, coverage = compare(frames[fixed], frames[moved], there, mask, error_per)
             pairs.append({"gap": gap, "from": i, "to": i + gap, "error": error, "tc_psnr_db": decibel(error),
                           "coverage": coverage})
     return pairs
@@ -201,11 +201,9 @@ def main():
     parser.add_argument("--warp", choices=("later", "earlier"), default="later", help="the frame that is sampled at the other's pixels")
     parser.add_argument("--error-per", choices=("channel", "pixel"), default="channel",
                         help="whether the sum of squares is divided by channels of pixels, or by pixels")
-    parser.add_argument("--as-published", action="store_true", help="without the three differences above")
     options = parser.parse_args()
     gaps = [int(gap) for gap in options.gaps.split(",")]
-    pairs = evaluate(read_frames(options.frames), options.flow, options.mode, gaps, options.warp, options.error_per,
-                     options.as_published)
+    pairs = evaluate(read_frames(options.frames), options.flow, options.mode, gaps, options.warp, options.error_per)
     json.dump({"mode": options.mode, "pairs": pairs}, sys.stdout, indent=1)
     print()
 

@@ -224,6 +224,23 @@ TEST(PaperConfig, TheChoiceKeepsWhatWasSetByHand) {
   }
 }
 
+// Both stages and the protocol are of the letter.
+TEST(PaperConfig, TheStyleAndTheProtocolAreOfTheLetter) {
+  const auto named = [](const std::vector<std::string>& arguments) {
+    std::vector<std::string> options;
+    for (const std::string& difference :
+         NotToTheLetter(kPaperBase, StyleValues(Of(arguments))))
+      options.push_back(difference.substr(0, difference.find(' ')));
+    return options;
+  };
+  EXPECT_TRUE(named({"--preset", "paper"}).empty());
+  EXPECT_EQ(named({"--preset", "paper", "--style-steps", "6", "--mode", "lai2018"}),
+            (std::vector<std::string>{"mode", "style-steps"}));
+  const std::vector<std::string> other = named({"--preset", "paper", "--recipe", "standard"});
+  for (const char* option : {"recipe", "style-loss", "style-rays", "style-base", "style-rate"})
+    EXPECT_TRUE(std::ranges::count(other, option)) << option;
+}
+
 TEST(PaperConfig, ContradictionsAreRefused) {
   EXPECT_REGRADE_ERROR(ChoosePaperConfig("syn", {}), ExitCode::kUsage, "auto");
   EXPECT_REGRADE_ERROR(ChoosePaperConfig("llff", {.transparent = true}), ExitCode::kUsage,

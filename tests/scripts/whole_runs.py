@@ -91,8 +91,9 @@ def paper(regrade, work):
     run(command)  # nothing is done again: the choice is the same
     fit = report_of(out)["stages"]["reconstruct"]
     expect(fit["paper_config"].startswith("custom: "), f"configuration {fit['paper_config']}")
-    differences = sorted(sentence.split()[0] for sentence in fit["not_to_the_letter"])
-    expect(differences == sorted(OVERRIDDEN), f"not to the letter: {fit['not_to_the_letter']}")
+    for stage, options in ((fit, sorted(OVERRIDDEN)), (report_of(out)["stages"]["stylize"], ["style-steps"])):
+        named = sorted(sentence.split()[0] for sentence in stage["not_to_the_letter"])
+        expect(named == options, f"not to the letter: {stage['not_to_the_letter']}")
     expect(fit["sh_degree"] == 2, "the degree was tried")
     for config, word in (("syn", "transparent"), ("llff", "one way")):
         refused = subprocess.run([regrade, "run", os.path.join(work, "capture", "truth"), "--style", STYLE, "--out", out + config,

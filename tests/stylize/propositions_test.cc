@@ -1,5 +1,6 @@
 // LipRF's propositions under their own premises, and how a field that breaks them is reported.
 #include "stylize/field/volume_variance.h"
+#include "tests/support/exact_weigher.h"
 #include "tests/support/record_error.h"
 #include "tests/support/row_of_voxels.h"
 #include "tests/support/styled_ball.h"
@@ -286,7 +287,7 @@ struct StyledField {
   }
   VarianceReport Measure(int64_t pairs) const {
     return MeasureVariance(source, styled, network, NeighbouringPixels(Ring(6, 60), pairs, 3),
-                           MarchOptions{});
+                           ExactWeigher(source).get());
   }
 };
 

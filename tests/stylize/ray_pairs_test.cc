@@ -7,6 +7,7 @@
 #include "kernels/field/render_ray.h"
 #include "stylize/field/blend_fields.h"
 #include "stylize/field/volume_variance.h"
+#include "tests/support/exact_weigher.h"
 #include "tests/support/small_field.h"
 #include "tests/support/styled_ball.h"
 
@@ -34,7 +35,7 @@ RadianceField HardBall() {
 TEST(RayPairs, BothRaysEndAtOnePoint) {
   const RadianceField ball = HardBall();
   const std::vector<Camera> cameras = Ring(9, 60);  // 40 degrees apart
-  const RayPairs pairs = PixelsOfOnePoint(ball, cameras, 1000, 3, MarchOptions{});
+  const RayPairs pairs = PixelsOfOnePoint(ball, cameras, 1000, 3, MarchOptions{}, ExactWeigher(ball).get());
   ASSERT_GT(pairs.size(), 1000);  // of 4000 pixels, two thirds on the ball
   for (size_t i = 0; i < pairs.rays.size(); i += 2) {
     const Vec3d a = EndOf(ball, pairs.rays[i]), b = EndOf(ball, pairs.rays[i + 1]);
@@ -48,19 +49,24 @@ TEST(RayPairs, BothRaysEndAtOnePoint) {
 // A wall between two cameras: what one sees, the other does not.
 TEST(RayPairs, APointThatIsHiddenIsNoPair) {
   const std::vector<Camera> opposite{Ring(2, 60)};
-  EXPECT_EQ(PixelsOfOnePoint(HardBall(), opposite, 500, 3, MarchOptions{}).size(), 0);
-  EXPECT_TRUE(PixelsOfOnePoint(HardBall(), {Ring(1, 60)}, 500, 3, MarchOptions{}).rays.empty());
+  const auto pairs = [](const RadianceField& field, const std::vector<Camera>& cameras) {
+    return PixelsOfOnePoint(field, cameras, 500, 3, MarchOptions{}, ExactWeigher(field).get())
+        .size();
+  };
+  EXPECT_EQ(pairs(HardBall(), opposite), 0);
+  EXPECT_EQ(pairs(HardBall(), {Ring(1, 60)}), 0);
   RadianceField empty = Ball(8);
   auto geometry = std::make_shared<Geometry>(*empty.geometry);
   for (int64_t i = 0; i < geometry->density.size(); ++i) geometry->density[i] = -1;
   empty.geometry = geometry;
-  EXPECT_TRUE(PixelsOfOnePoint(empty, Ring(9, 60), 500, 3, MarchOptions{}).rays.empty());
+  EXPECT_EQ(pairs(empty, Ring(9, 60)), 0);
 }
 
 TEST(RayPairs, TheSameForAnyNumberOfThreads) {
   const RadianceField ball = Ball(20);
   const auto pairs = [&] {
-    return PixelsOfOnePoint(ball, Ring(9, 60), 200, 5, MarchOptions{});
+    return PixelsOfOnePoint(ball, Ring(9, 60), 200, 5, MarchOptions{},
+                            ExactWeigher(ball).get());
   };
   const RayPairs one = [&] {
     const Threads single(1);
@@ -118,7 +124,7 @@ TEST(VolumeVariance, PairsOnSpheresAreAGroupAndDifferAsRendered) {
   scene.Style();
   const RayPairs pairs = NeighbouringPixels(scene.cameras, 2000, 3);
   const VarianceReport report =
-      MeasureVariance(scene.source, scene.styled, scene.network, pairs, MarchOptions{});
+      MeasureVariance(scene.source, scene.styled, scene.network, pairs, ExactWeigher(scene.source).get());
   EXPECT_EQ(report.Pairs(), 2000);
   EXPECT_GT(report.spheres.pairs, 500);
   EXPECT_GT(report.valid.pairs, 200);
@@ -135,9 +141,9 @@ TEST(VolumeVariance, PairsOnSpheresAreAGroupAndDifferAsRendered) {
 TEST(VolumeVariance, PixelsOfOnePointStayBelowTheBound) {
   Surrounded scene;
   scene.Style();
-  const RayPairs pairs = PixelsOfOnePoint(scene.source, scene.cameras, 2000, 3, MarchOptions{});
+  const RayPairs pairs = PixelsOfOnePoint(scene.source, scene.cameras, 2000, 3, MarchOptions{}, ExactWeigher(scene.source).get());
   const VarianceReport report =
-      MeasureVariance(scene.source, scene.styled, scene.network, pairs, MarchOptions{});
+      MeasureVariance(scene.source, scene.styled, scene.network, pairs, ExactWeigher(scene.source).get());
   EXPECT_GT(report.valid.pairs, 500);
   EXPECT_LE(report.largest_fraction, 1 + 1e-4);
   EXPECT_GT(report.largest_fraction, 0.05);
@@ -158,7 +164,7 @@ TEST(VolumeVariance, AnObjectsBoundIsThatOfItsWholeVoxels) {
   scene.styled = MixFields(scene.source, {&whole}, {1}, &weights);
   const RayPairs pairs = NeighbouringPixels(scene.cameras, 3000, 3);
   const VarianceReport report = MeasureVariance(scene.source, scene.styled, scene.network,
-                                                pairs, MarchOptions{}, &weights);
+                                                pairs, ExactWeigher(scene.source).get(), &weights);
   EXPECT_GT(report.valid.pairs, 50);  // opaque, on the whole half
   EXPECT_GT(report.partial.pairs, 200);
   EXPECT_LE(report.largest_fraction, 1 + 1e-4);
@@ -166,7 +172,7 @@ TEST(VolumeVariance, AnObjectsBoundIsThatOfItsWholeVoxels) {
   // What is not of the object does not change.
   const std::vector<float> none(weights.size(), 0.0f);
   const VarianceReport outside =
-      MeasureVariance(scene.source, scene.source, scene.network, pairs, MarchOptions{}, &none);
+      MeasureVariance(scene.source, scene.source, scene.network, pairs, ExactWeigher(scene.source).get(), &none);
   EXPECT_EQ(outside.valid.pairs, 0);
   EXPECT_EQ(outside.partial.above, 0);
   EXPECT_NEAR(outside.partial.Gain(), 1, 1e-12);

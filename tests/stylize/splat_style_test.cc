@@ -9,6 +9,7 @@
 #include "stylize/field/voxel_residual.h"
 #include "stylize/training/restyle_field.h"
 #include "tests/support/algorithm1.h"
+#include "tests/support/exact_weigher.h"
 #include "tests/support/expect_error.h"
 #include "tests/support/record_error.h"
 #include "tests/support/row_of_voxels.h"
@@ -328,14 +329,15 @@ TEST_P(SplatStyleOf, PairsStayBelowTheirBound) {
   RadianceField styled = source;
   styled.appearance = ApplyNetwork(network, source);
   const std::vector<Camera> cameras = Ring(9, 60);
+  const auto weigher = ExactWeigher(source);
   const RayPairs neighbours = NeighbouringPixels(cameras, 2000, 3),
-                 points = PixelsOfOnePoint(source, cameras, 2000, 3, {});
+                 points = PixelsOfOnePoint(source, cameras, 2000, 3, {}, weigher.get());
   EXPECT_EQ(neighbours.size(), 4000);
   EXPECT_GT(points.size(), 500);
   for (size_t i = 0; i < points.rays.size(); i += 2)
     EXPECT_NE(points.places[i].camera, points.places[i + 1].camera);
   for (const RayPairs& pairs : {neighbours, points}) {
-    const VarianceReport report = MeasureVariance(source, styled, network, pairs, {});
+    const VarianceReport report = MeasureVariance(source, styled, network, pairs, weigher.get());
     EXPECT_GT(report.valid.pairs, 200);
     EXPECT_GT(report.largest_fraction, 0.05);
     EXPECT_LE(report.largest_fraction, 1 + 1e-4);  // float's rounding of coefficients
@@ -346,12 +348,12 @@ TEST_P(SplatStyleOf, PairsStayBelowTheirBound) {
   RadianceField clear = source, clear_styled = styled;
   clear.geometry = clear_styled.geometry = thin;
   clear_styled.background = {0.7f, 0.1f, 0.5f};
-  const VarianceReport report = MeasureVariance(clear, clear_styled, network, neighbours, {});
+  const VarianceReport report = MeasureVariance(clear, clear_styled, network, neighbours, ExactWeigher(clear).get());
   EXPECT_GT(report.transparent.pairs, 1000);
   EXPECT_GT(report.largest_fraction, 0.1);
   EXPECT_LE(report.largest_fraction, 1 + 1e-4);
   const Threads single(1);
-  EXPECT_EQ(PixelsOfOnePoint(source, cameras, 2000, 3, {}).size(), points.size());
+  EXPECT_EQ(PixelsOfOnePoint(source, cameras, 2000, 3, {}, weigher.get()).size(), points.size());
 }
 
 // --- positions
