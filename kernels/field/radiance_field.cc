@@ -111,9 +111,11 @@ void Validate(const RadianceField& field, const char* name) {
                      ")");
   if (!AllFinite(field.background) || !std::isfinite(field.near_clip) || field.near_clip < 0)
     Refuse(name, "the background colour or the near distance is not valid");
-  if (!(field.step >= 0.01f && field.step <= 16))
-    Refuse(name,
-           "the step is " + std::to_string(field.step) + " voxels, 0.01 to 16 are supported");
+  if (!(field.march.step >= 0.01f && field.march.step <= 16))
+    Refuse(name, "the step is " + std::to_string(field.march.step) +
+                     " voxels, 0.01 to 16 are supported");
+  if (!(field.march.stop_transmittance >= 0 && field.march.stop_transmittance <= 0.1f))
+    Refuse(name, "the transmittance at which rays stop is not in [0, 0.1]");
 }
 
 FieldView<float> ViewOf(const RadianceField& field) {

@@ -9,6 +9,7 @@
 #include "kernels/base/buffer.h"
 #include "kernels/base/vec.h"
 #include "kernels/field/grid_frame.h"
+#include "kernels/field/march_options.h"
 
 namespace regrade {
 
@@ -67,7 +68,7 @@ struct RadianceField {
   Appearance appearance;
   Vec3f background{0, 0, 0};  // sRGB, visible where transmittance remains
   float near_clip = 0;        // world units along the ray, for rendering and fitting
-  float step = 0.5f;          // voxels between samples of a ray; splats have none
+  MarchOptions march;         // for rendering and styling; splats need none
 };
 
 // Throws Error(kInput) naming the defect: inconsistent sizes, a link out of range (F68),

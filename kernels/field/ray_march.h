@@ -5,15 +5,11 @@
 #include <cstdint>
 
 #include "kernels/base/vec.h"
+#include "kernels/field/march_options.h"
 #include "kernels/field/radiance_field.h"
 #include "kernels/scene/camera.h"
 
 namespace regrade {
-
-struct MarchOptions {
-  float step = 0.5f;                 // voxels
-  float stop_transmittance = 1e-4f;  // a ray ends below it; bounds the lost light per channel
-};
 
 inline constexpr int64_t kMaxSteps = 1 << 20;
 

@@ -13,7 +13,7 @@ namespace {
 class VoxelRenderer : public KindRenderer {
  public:
   VoxelRenderer(const RadianceField& field, Backend backend)
-      : backend_(backend), march_{field.step}, grid_(MakeFastGrid(field)) {
+      : backend_(backend), march_(field.march), grid_(MakeFastGrid(field)) {
     if (backend == Backend::kCpu) return;
     device_ = UploadGrid(grid_);
     grid_ = FastGrid();

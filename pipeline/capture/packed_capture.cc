@@ -141,6 +141,7 @@ void WritePackedCapture(const std::string& path, const PackedCapture& capture) {
   NpzWriter file;
   file.AddScalar<int32_t>("regrade_version", kVersion);
   file.AddText("files", names);
+  file.AddText("decided", capture.decided);
   file.Add("cameras", {n, kCameraValues}, cameras.data());
   file.Add("held_out", {n}, held_out.data());
   file.Add("pixels", {bytes}, pixels.data(), NpzPacking::kDeflate);
@@ -181,6 +182,7 @@ PackedCapture ReadPackedCapture(const std::string& path) {
   const NpzArray ndc = file.Read("ndc", ArrayType::kF64, {2});
   const std::string names = file.ReadText("files");
   PackedCapture capture;
+  if (file.Has("decided")) capture.decided = file.ReadText("decided");
   capture.scene.ndc = {ndc.As<double>()[0], ndc.As<double>()[1]};
   const float* b = box.As<float>();
   capture.scene.box.center = {b[0], b[1], b[2]};

@@ -28,6 +28,8 @@ struct PackedCapture {
   NormalizedScene scene;
   std::vector<PackedView> views;
   Image style;  // [H, W, 3] sRGB, or empty: the style picture
+  // JSON of the options that decided the scene; empty in older files.
+  std::string decided;
 };
 
 // Throws Error(kResources).

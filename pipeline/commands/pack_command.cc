@@ -69,6 +69,9 @@ void RunPack(const Command& command, const Arguments& arguments, Console* consol
     throw UsageError("a packed capture holds one style picture", "--match", "leave it out");
   if (!style.pictures.empty()) packed.style = SmallPicture(style.picture());
   packed.scene = profile.scene;
+  JsonValue decided = OptionValues(scene);
+  decided["effects"] = run.effects;
+  packed.decided = DumpJson(decided, -1);
   const WorkingViews views = as_taken.WithGains(profile.gains)
                                  .InField(packed.scene.field_from_world, packed.scene.ndc);
   const std::vector<bool> held_out = HeldOutViews(capture, run.holdout);

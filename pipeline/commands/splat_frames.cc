@@ -94,10 +94,10 @@ std::vector<Camera> CamerasOfFrames(const SplatFrames& frames, const DrawnSplats
   const std::string& given = frames.views.cameras;
   std::vector<Camera> cameras;
   for (const auto& [name, camera] :
-       given.empty()
-           ? PlacedCameras(reference.scene.splats, reference.renderer, frames.views.up,
-                           frames.size, frames.reference, console, progress)
-           : CamerasOfCapture(given, progress))
+       given.empty() ? PlacedCameras(reference.scene.splats, reference.field,
+                                     ChooseBackend("auto", false), frames.views.up, frames.size,
+                                     frames.reference, console, progress)
+                     : CamerasOfCapture(given, progress))
     cameras.push_back(ReducedTo(frames.size, camera));
   const std::string from = given.empty() ? "the placed views" : "the cameras of " + given;
   std::string how = "frames at " + from + ", in their order";

@@ -289,7 +289,8 @@ void WriteFieldFile(const std::string& path, const StoredField& stored) {
   file.AddScalar<int32_t>("regrade_basis", field.appearance.basis);
   file.Add("regrade_background", {3}, &field.background.x);
   file.AddScalar<float>("regrade_near_clip", field.near_clip);
-  file.AddScalar<float>("regrade_step", field.step);
+  file.AddScalar<float>("regrade_step", field.march.step);
+  file.AddScalar<float>("regrade_stop", field.march.stop_transmittance);
   file.Add("regrade_field_from_world", {13}, placement);
   if (stored.ndc.on()) file.Add("regrade_ndc", {2}, &stored.ndc.a);
   AddSpheres(field, &made, &file);
@@ -319,7 +320,10 @@ StoredField ReadFieldFile(const std::string& path, uint64_t budget) {
       file.Has("regrade_background") ? ReadVec3(&file, "regrade_background") : Vec3f{1, 1, 1};
   if (file.Has("regrade_near_clip"))
     stored.field.near_clip = file.ReadScalar<float>("regrade_near_clip");
-  if (file.Has("regrade_step")) stored.field.step = file.ReadScalar<float>("regrade_step");
+  if (file.Has("regrade_step"))
+    stored.field.march.step = file.ReadScalar<float>("regrade_step");
+  if (file.Has("regrade_stop"))
+    stored.field.march.stop_transmittance = file.ReadScalar<float>("regrade_stop");
   if (file.Has("regrade_field_from_world")) {
     const NpzArray array = file.Read("regrade_field_from_world", ArrayType::kF64, {13});
     const double* placement = array.As<double>();

@@ -7,8 +7,8 @@
 // padded with zeros to 9 harmonics a channel; those of splats of degree 3 have 48 columns.
 // Additional: regrade_version i32, regrade_basis
 // i32, regrade_background f32[3], regrade_near_clip f32, regrade_step f32 (voxels),
-// regrade_field_from_world f64[13] (scale, rotation by rows, translation), regrade_ndc f64[2]
-// where the field is in normalised device coordinates (ndc.h).
+// regrade_stop f32, regrade_field_from_world f64[13] (scale, rotation by rows, translation),
+// regrade_ndc f64[2] where the field is in normalised device coordinates (ndc.h).
 //
 // A field of splats has neither links nor density_data: in their place are
 // regrade_splats_mean f32[N,3], regrade_splats_log_scale f16[N,3], regrade_splats_quaternion

@@ -74,6 +74,22 @@ std::string ChoosePaper(const FitPackedOptions& settings, const PackedCapture& c
   return choice.name;
 }
 
+// The fit's and those with which the capture was packed.
+JsonValue::Array DifferencesTo(const std::string& paper, const FitOptions& options,
+                               const PackedCapture& capture) {
+  JsonValue values = OptionValues(options);
+  JsonValue::Array differences;
+  if (capture.decided.empty()) {
+    differences.push_back("the capture does not say how its box was decided: pack it again");
+  } else {
+    const JsonValue decided = ParseJson(capture.decided, "decided");
+    for (const auto& [option, value] : decided.AsObject()) values[option] = value;
+  }
+  for (std::string& difference : NotToTheLetter(paper, values))
+    differences.push_back(std::move(difference));
+  return differences;
+}
+
 // The options for this capture, lowered to memory, which is reported; checkpoints are of those
 // that were asked for.
 FitOptions OptionsForCapture(const FitPackedOptions& settings, const FitOptions& asked,
@@ -177,16 +193,14 @@ void FitPacked(const FitPackedOptions& settings, const FitOptions& fit_options,
   JsonValue::Array curve;
   for (size_t i = 0; i < fit.curve.size(); i += std::max<size_t>(1, fit.curve.size() / 100))
     curve.push_back(JsonValue::Array{fit.curve[i].seconds, fit.curve[i].psnr_train_db});
-  JsonValue::Array differences;
-  if (!paper.empty())
-    for (std::string& difference : NotToTheLetter(paper, OptionValues(options)))
-      differences.push_back(std::move(difference));
+  const JsonValue::Array differences =
+      paper.empty() ? JsonValue::Array() : DifferencesTo(paper, options, capture);
   const DeviceStatus device = ReadDeviceStatus();
   const JsonValue record =
       JsonValue::Object{{"capture", settings.capture},
                         {"device", settings.device == "cpu" ? "cpu" : device.name},
                         {"paper_config", paper.empty() ? JsonValue() : JsonValue(paper)},
-                        {"not_to_the_letter", std::move(differences)},
+                        {"not_to_the_letter", differences},
                         {"finest_grid", std::ranges::max(options.resolutions)},
                         {"seconds_read", read_seconds},
                         {"seconds_fit", fit_seconds},

@@ -52,7 +52,7 @@ void RenderPacked(const RenderPackedOptions& settings) {
                         {KindOf(*field.geometry).name, field.geometry->num_voxels()}};
   if (settings.compare)
     record["compare"] =
-        CompareRenderers(UploadGrid(MakeFastGrid(field)), capture, field.step, settings);
+        CompareRenderers(UploadGrid(MakeFastGrid(field)), capture, field.march.step, settings);
   else
     record["render"] = RenderCosts(field, capture);
   std::printf("%s\n", DumpJson(record, -1).c_str());

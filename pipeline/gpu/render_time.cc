@@ -112,7 +112,7 @@ double SplatMilliseconds(const RadianceField& field, const PackedCapture& captur
 
 JsonValue RenderCosts(const RadianceField& field, const PackedCapture& capture) {
   if (!field.geometry->splats.on())
-    return RenderCosts(UploadGrid(MakeFastGrid(field)), capture, field.step);
+    return RenderCosts(UploadGrid(MakeFastGrid(field)), capture, field.march.step);
   const FieldRenderer renderer(field, Backend::kCuda);
   std::vector<double> against_photo, ssim, detail_kept;
   for (const PackedView& view : capture.views) {

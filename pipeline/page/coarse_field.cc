@@ -147,7 +147,7 @@ std::optional<RadianceField> FieldOf(const RadianceField& fine, const Sums& sums
   field.geometry = std::move(geometry);
   field.background = fine.background;
   field.near_clip = fine.near_clip;
-  field.step = 1;
+  field.march.step = 1;
   return field;
 }
 

@@ -120,7 +120,7 @@ PageField EncodeSplats(const RadianceField& any, double step) {
       {"basis", basis},
       {"background", ArrayOf(field.background)},
       {"near", double{field.near_clip}},
-      {"step", double{field.step}},
+      {"step", double{field.march.step}},
       {"color", JsonOf(code)},
       {"splats", JsonValue::Object{{"coarse", order.coarse},
                                    {"fit_pixel", options.fit_pixel},
@@ -173,7 +173,7 @@ RadianceField DecodeSplats(const PageField& page) {
   CheckColors(field.appearance.sh);
   field.background = Vec3At(header, "background");
   field.near_clip = static_cast<float>(header.At("near").AsDouble());
-  field.step = static_cast<float>(header.At("step").AsDouble());
+  field.march.step = static_cast<float>(header.At("step").AsDouble());
   field.geometry = std::move(geometry);
   return field;
 }

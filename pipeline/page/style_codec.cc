@@ -106,7 +106,7 @@ PageStyle EncodeStyle(const StoredNetwork& stored, const RadianceField& page, do
   }
   const FusedMlp fused = MakeFusedMlp(dense);
   PageStyle style;
-  style.styled = {page.geometry, {}, stored.background, page.near_clip, page.step};
+  style.styled = {page.geometry, {}, stored.background, page.near_clip, page.march};
   RadianceField padded;  // of a page with fewer harmonics
   if (page.appearance.basis != kStyledBasis) {
     padded = page;

@@ -183,7 +183,7 @@ PageField EncodeVoxels(const RadianceField& field, double step) {
       {"basis", field.appearance.basis},
       {"background", ArrayOf(field.background)},
       {"near", double{field.near_clip}},
-      {"step", double{field.step}}};
+      {"step", double{field.march.step}}};
   AddSection("mask", places, &page);
   AddSection("density", PackNumbers(density, 1, order.earlier), &page);
   EncodeVoxelColors({field.appearance.sh.data(), field.appearance.basis, voxel}, order.earlier,
@@ -222,7 +222,7 @@ RadianceField DecodeVoxels(const PageField& page) {
   DecodeSpheres(page, geometry.get(), &field.appearance.sphere_color);
   field.background = Vec3At(header, "background");
   field.near_clip = static_cast<float>(header.At("near").AsDouble());
-  field.step = static_cast<float>(header.At("step").AsDouble());
+  field.march.step = static_cast<float>(header.At("step").AsDouble());
   field.geometry = std::move(geometry);
   return field;
 }

@@ -61,6 +61,7 @@ void UseSyn(RunSettings* settings) {
   fit.tv_density = 1e-5f;
   fit.tv_sh = 1e-3f;
   fit.tv_decay = 0;  // ends with the first upsampling
+  fit.ball = true;
   settings->scene.photo_size = 800;
   // Its cameras are 4.031 from the middle, and its box has a half side of 1.5.
   settings->scene.box.camera_range = 2.687f;

@@ -44,8 +44,8 @@ void CheckPaper(const std::string& preset, const std::string& config);
 // it, or where its value is not the base's: it was asked for.
 void ApplyPaperChoice(const PaperChoice& choice, OptionSet* options);
 
-// "fit-rays is 64, published 5000" for each of `values` that is neither the configuration's nor,
-// of StyleValues, the recipe's and the protocol's.
+// "fit-rays is 64, published 5000" for each of `values` that is neither the configuration's
+// nor, of StyleValues, the recipe's and the protocol's.
 std::vector<std::string> NotToTheLetter(const std::string& name, const JsonValue& values);
 
 }  // namespace regrade

@@ -26,7 +26,7 @@ ObjectWeights VoteForObject(const RunSettings& settings, const WorkingViews& wor
                             const RadianceField& field, const ProgressFunction& progress) {
   std::vector<MaskVote> votes;
   for (int k = 0; k < masks.num_regions(); ++k)
-    votes.emplace_back(*field.geometry, field.near_clip, MarchOptions{field.step});
+    votes.emplace_back(*field.geometry, field.near_clip, field.march);
   for (size_t n = 0; n < views.size(); ++n) {
     ReportOrThrow(progress, n, views.size(), "masks vote");
     const int i = views[n];

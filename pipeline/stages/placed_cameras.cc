@@ -19,14 +19,15 @@ Vec3d UpOf(const std::string& word) {
 
 }  // namespace
 
-std::vector<BareCamera> PlacedCameras(const Splats& splats, const FieldRenderer& renderer,
-                                      const std::string& up, int longest,
+std::vector<BareCamera> PlacedCameras(const Splats& splats, const RadianceField& field,
+                                      Backend backend, const std::string& up, int longest,
                                       const std::string& where, Console* console,
                                       const ProgressFunction& progress) {
   const SceneUp chosen =
       up == "auto" ? EstimateUp(splats) : SceneUp{UpOf(up), "up is " + up + " by --up"};
   console->Info(chosen.why);
-  const PlacedViews placed = PlaceViews(splats, renderer, chosen.up, longest, where, progress);
+  const PlacedViews placed =
+      PlaceViews(splats, field, backend, chosen.up, longest, where, progress);
   console->Info(placed.summary);
   std::vector<BareCamera> cameras;
   for (const int i : SmoothOrder(placed.cameras))

@@ -67,14 +67,14 @@ StageOutcome PlaceViews(RunContext* context, const ProgressFunction& progress) {
   const SplatScene scene =
       ReadForeignSplats(context->source, settings.run.max_memory_gb, context->console);
   const RadianceField field = FieldInItsWorld(scene);
-  const FieldRenderer renderer(field,
-                               ChooseBackend(settings.run.device, settings.run.reproducible));
+  const Backend backend = ChooseBackend(settings.run.device, settings.run.reproducible);
+  const FieldRenderer renderer(field, backend);
   ProgressParts parts(progress, 2);
   const ProgressFunction placing = parts.Next(1);
   const std::string& given = settings.splat_input.cameras;
   const double longest = kFilmOverWorkingSize * settings.scene.photo_size;
   std::vector<BareCamera> cameras =
-      given.empty() ? PlacedCameras(scene.splats, renderer, settings.splat_input.up,
+      given.empty() ? PlacedCameras(scene.splats, field, backend, settings.splat_input.up,
                                     static_cast<int>(std::lround(longest)), context->source,
                                     context->console, placing)
                     : ReadBareCameras(given);

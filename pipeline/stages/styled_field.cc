@@ -27,7 +27,7 @@ StoredField StyledFieldOf(StoredField source, const StoredNetwork& network, doub
     field.background = network.background;
   } else {
     const RadianceField all{field.geometry, std::move(styled), network.background,
-                            field.near_clip, field.step};
+                            field.near_clip, field.march};
     field = MixFields(field, {&all}, {strength}, object_weights);
   }
   RoundAsStored(&source.field.appearance);

@@ -56,7 +56,7 @@ void SetVariance(const RestyledField& restyled, const std::vector<StyledTraining
   std::vector<Camera> cameras;
   for (const StyledTrainingView& view : views) cameras.push_back(view.camera);
   const RadianceField& source = restyled.source;
-  const MarchOptions march{source.step};
+  const MarchOptions march = source.march;
   const auto measure = [&](const RayPairs& pairs) {
     return MetricsOfVariance(MeasureVariance(source, restyled.styled, restyled.trained.network,
                                              pairs, weigher, object_weights));
@@ -169,7 +169,8 @@ StageOutcome Stylize(RunContext* context, const JsonValue& inputs,
     SetVariance(restyled, targets.targets().views(), settings.run.seed, request.object_weights,
                 weigher, &checked);
   };
-  const RestyledField restyled = Restyle(std::move(stored.field), targets.targets(), request, hooks);
+  const RestyledField restyled =
+      Restyle(std::move(stored.field), targets.targets(), request, hooks);
   const TrainNetworkResult& trained = restyled.trained;
   for (const std::string& notice : restyled.notices) context->console->Info(notice);
   for (const std::string& warning : trained.warnings) context->console->Warn(warning);

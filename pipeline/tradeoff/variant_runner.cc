@@ -285,18 +285,18 @@ const VariantRunner::Frames& VariantRunner::BaseFrames() {
 void VariantRunner::MeasureRender(const Variant& variant, Measurement* m) {
   const Frames& f = BaseFrames();
   const FastGrid grid = MakeFastGrid(f.stored.field);
-  MarchOptions march{f.stored.field.step};
+  MarchOptions march = f.stored.field.march;
   if (const JsonValue* stop = variant.options.Find("ray-stop"))
     march.stop_transmittance = static_cast<float>(stop->AsDouble());
   if (const JsonValue* step = variant.options.Find("ray-step"))
-    march.step = static_cast<float>(step->AsDouble()) * f.stored.field.step;
+    march.step = static_cast<float>(step->AsDouble()) * f.stored.field.march.step;
   std::vector<Image> frames;
   Clocks clocks(m);
   for (size_t i = 0; i < std::min<size_t>(kRenderedFrames, f.cameras.size()); ++i)
     frames.push_back(RenderView(grid, f.cameras[i], march).color);
   clocks.Stop(static_cast<double>(frames.size()));
   // Beside rays that are marched to the end.
-  const MarchOptions accurate{0.25f * f.stored.field.step, 0};
+  const MarchOptions accurate{0.25f * f.stored.field.march.step, 0};
   std::vector<double> squared;
   for (size_t i = 0; i < frames.size(); ++i)
     if (const auto error =

@@ -32,7 +32,7 @@ double PsnrOn(const std::vector<TrainingView>& views, const RadianceField& field
   double squares = 0;
   int64_t count = 0;
   for (const TrainingView& view : views) {
-    const RenderedView rendered = RenderView(grid, view.camera, {field.step});
+    const RenderedView rendered = RenderView(grid, view.camera, field.march);
     for (size_t i = 0; i < view.photo->pixels.size(); ++i) {
       if (!std::isfinite(view.photo->pixels[i])) continue;
       const double value = std::clamp(rendered.color.pixels[i], 0.0f, 1.0f);

@@ -108,7 +108,10 @@ class Fitter {
     if (hooks_.keep_field) {
       engine_->ReadState(
           [this](FitState* state) { result_.field = ToRadianceField(state->grid); });
-      result_.field.step = options_.step;
+      // No ray of the fit ended later than those that look at its field.
+      result_.field.march.step = options_.step;
+      result_.field.march.stop_transmittance =
+          std::min(result_.field.march.stop_transmittance, options_.stop_transmittance);
     }
     result_.psnr_train_db = PsnrOf(tally_.tail_error, tally_.tail_rays);
     result_.rays = tally_.rays;
@@ -129,7 +132,7 @@ class Fitter {
     const GridFrame frame{GridOfStage(options_, box_, 0), box_.center, box_.radius};
     return MakeInitialGrid(rays_, frame, BasisOfDegree(options_.sh_degree),
                            options_.initial_density, box_.near_clip, options_.initial_views,
-                           box_.far_surroundings);
+                           options_.ball || box_.far_surroundings);
   }
 
   int StepsBefore() const {

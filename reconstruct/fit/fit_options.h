@@ -18,6 +18,7 @@ struct FitOptions {
   int sh_degree = 2;
   float view_bound = 0.2f;
   float step = 1.0f;
+  bool ball = false;
   float stop_transmittance = 1e-3f;
   float rate_density = 8.0f;
   float rate_density_end = 1.0f;
@@ -119,6 +120,9 @@ struct FitOptions {
                   "nothing on real photos",
           .min = 0.1,
           .max = 4,
+          .constant = true});
+    bind("fit-ball", ball,
+         {.help = "the first grid has the voxels within the box's ball alone",
           .constant = true});
     bind("fit-stop", stop_transmittance,
          {.help = "transmittance at which a ray ends; the error per channel is at most this",

@@ -13,8 +13,7 @@
 namespace regrade {
 
 // A mid-grey grid of one density that stores every vertex seen by at least `min_views` cameras
-// beyond near_clip; 0 stores all. With `ball`, only vertices within the box's unit sphere: the
-// background spheres model the rest.
+// beyond near_clip; 0 stores all. With `ball`, only vertices within the box's unit sphere.
 FastGrid MakeInitialGrid(const TrainingRays& rays, const GridFrame& frame, int basis,
                          float density, float near_clip, int min_views, bool ball = false);
 

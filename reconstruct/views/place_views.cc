@@ -18,7 +18,8 @@ namespace {
 constexpr double kFocal = 0.9;  // over the picture's longer side: 58 degrees
 constexpr int kProbeSide = 64;  // pixels
 constexpr int64_t kSamples = 3000;
-constexpr double kMargin = 1.2;       // around an object: a film cuts corners
+constexpr int64_t kProbedSplats = 200'000;  // a small picture needs no more
+constexpr double kMargin = 1.2;             // around an object: a film cuts corners
 constexpr double kPortrait = 0.85;    // of the distance: so much nearer shows an object upright
 constexpr double kFewestHoles = 0.6;  // quality of a view over the middle one
 constexpr double kFarFromBest = 0.45;  // worth of a view over the best one's
@@ -261,9 +262,10 @@ Stage StageOf(const Splats& splats, const Vec3d& up) {
 
 }  // namespace
 
-PlacedViews PlaceViews(const Splats& splats, const FieldRenderer& renderer, const Vec3d& up,
-                       int longest, const std::string& where,
+PlacedViews PlaceViews(const Splats& splats, const RadianceField& field, Backend backend,
+                       const Vec3d& up, int longest, const std::string& where,
                        const ProgressFunction& progress) {
+  const FieldRenderer renderer(FieldForProbes(splats, field, kProbedSplats), backend);
   const Stage stage = StageOf(splats, up);
   const Placement placement(renderer, stage, SampleSplats(splats, kSamples));
   ProgressParts parts(progress, 6);

@@ -4,6 +4,8 @@
 #include <cmath>
 
 #include "kernels/base/quantile.h"
+#include "kernels/base/random.h"
+#include "kernels/splats/splat_field.h"
 #include "reconstruct/views/splat_extent.h"
 
 namespace regrade {
@@ -41,6 +43,22 @@ std::vector<SplatSample> SampleSplats(const Splats& splats, int64_t most) {
     samples.push_back({splat.mean.Cast<double>(), SizeOf(splat)});
   }
   return samples;
+}
+
+RadianceField FieldForProbes(const Splats& splats, const RadianceField& field, int64_t most) {
+  const int64_t few = std::max<int64_t>(1, (splats.count() + most - 1) / most);
+  const SplatsView<float> view = splats.view();
+  const float larger = 0.5f * std::log(static_cast<float>(few));
+  Splats some(splats.count() / few, 1);
+  for (int64_t i = 0; i < some.count(); ++i) {
+    const uint64_t drawn =
+        RandomIndex(0, 0, static_cast<uint64_t>(i), static_cast<uint64_t>(few));
+    Splat<float> splat = view[i * few + static_cast<int64_t>(drawn)];
+    for (int a = 0; a < 3; ++a) splat.log_scale[a] += larger;
+    some.Set(i, splat);
+  }
+  return FieldOfSplats(some, field.geometry->frame, field.near_clip,
+                       field.geometry->splats.fit_pixel);
 }
 
 ViewProbe ProbeView(const FieldRenderer& renderer, const Camera& camera,

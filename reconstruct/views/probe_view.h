@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "kernels/field/radiance_field.h"
 #include "kernels/render/field_renderer.h"
 #include "kernels/scene/camera.h"
 #include "kernels/splats/splats.h"
@@ -30,6 +31,10 @@ struct SplatSample {
   double size;  // middle one of the standard deviations, world units
 };
 std::vector<SplatSample> SampleSplats(const Splats& splats, int64_t most);
+
+// What probes see of `field`, which is made of `splats`: no colours, and of more than `most`
+// splats one of each few, which covers as much as they do.
+RadianceField FieldForProbes(const Splats& splats, const RadianceField& field, int64_t most);
 
 // A splat is seen best where it is 0.4 to 4 pixels large in a picture of 480 pixels: photos
 // show no more from farther away, and had no more to show from nearer.

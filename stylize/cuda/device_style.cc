@@ -74,9 +74,8 @@ class DeviceStyleLoss : public StyleLoss {
     result.rays = static_cast<int64_t>(sums.rays);
     result.squared_error = sums.squared_error;
     if (result.rays == 0) return result;
-    const double count = options_.divide_by_voxels
-                             ? static_cast<double>(field_.grid.num_voxels())
-                             : 3.0 * static_cast<double>(result.rays);
+    const double count = options_.divide_by_voxels ? static_cast<double>(NumMapped(field_))
+                                                   : 3.0 * static_cast<double>(result.rays);
     result.loss = sums.loss / count;
     if (gradient == nullptr) return result;
     mlp_->AddAdjoint(precision, features_.data(), d_rows_.data(), slots_.num_slots);

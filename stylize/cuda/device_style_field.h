@@ -27,6 +27,11 @@ struct DeviceStyleField {
   }
 };
 
+// Voxels or splats, and texels of the background: what the network maps.
+inline int64_t NumMapped(const DeviceStyleField& field) {
+  return field.grid.num_voxels() + field.grid.spheres.num_texels();
+}
+
 // Throws Error(kResources) without a device, or where its memory is too small.
 DeviceStyleField UploadStyleField(const RadianceField& field);
 Appearance DownloadAppearance(const DeviceStyleField& field);

@@ -21,16 +21,16 @@ std::vector<std::pair<int, int>> LayerShapes(const LipschitzNetwork& network) {
 }
 
 // What a summed loss is divided by, of voxels; 0: three times the rays that count.
-double LossDivisor(const DeviceGrid& grid, const AggregationOptions& options) {
-  return options.divide_by_voxels ? static_cast<double>(grid.num_voxels()) : 0;
+double LossDivisor(const DeviceStyleField& field, const AggregationOptions& options) {
+  return options.divide_by_voxels ? static_cast<double>(NumMapped(field)) : 0;
 }
 
-TrainingParams ParamsOf(const DeviceGrid& grid, const AggregationOptions& options,
+TrainingParams ParamsOf(const DeviceStyleField& field, const AggregationOptions& options,
                         const WeightUpdate& update, const LipschitzNetworkData& network) {
   return {.update = update,
           .input_scale = network.sh_scale,
           .scaled_inputs = NetworkRow{network.basis}.sh(),
-          .loss_divisor = LossDivisor(grid, options)};
+          .loss_divisor = LossDivisor(field, options)};
 }
 
 }  // namespace
@@ -49,7 +49,7 @@ class DeviceTraining::CapturedSteps {
         touched_(field->grid),
         slots_(field->grid),
         mlp_(MakeFusedMlp(network.Effective<float>())),
-        optimizer_(LayerShapes(network), ParamsOf(field->grid, options, update, network.data()),
+        optimizer_(LayerShapes(network), ParamsOf(*field, options, update, network.data()),
                    mlp_),
         rays_(rays_per_step, "rays"),
         targets_(rays_per_step, "colours of rays"),
@@ -107,7 +107,7 @@ class DeviceTraining::CapturedSteps {
       if (i + 1 < state.step) continue;
       steps.last = {step.loss, step.squared_error, static_cast<int64_t>(step.rays),
                     step.touched, step.samples};
-      const double voxels = LossDivisor(field_.grid, options_);
+      const double voxels = LossDivisor(field_, options_);
       const double divisor = voxels > 0 ? voxels : 3.0 * static_cast<double>(step.rays);
       steps.last.loss = step.rays > 0 ? step.loss / divisor : 0;
     }

@@ -89,7 +89,7 @@ RadianceField MixFields(const RadianceField& source,
   RadianceField mixed;
   mixed.geometry = source.geometry;
   mixed.near_clip = source.near_clip;
-  mixed.step = source.step;
+  mixed.march = source.march;
   mixed.background = source.background;
   if (object_weights == nullptr) {
     std::vector<const float*> backgrounds{&source.background.x};

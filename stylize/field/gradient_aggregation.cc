@@ -226,7 +226,7 @@ AggregationResult GradientAggregation::Run(const LipschitzNetwork& network,
   ForgetTouched();
 
   const double count = options_.divide_by_voxels
-                           ? static_cast<double>(field_.geometry->num_voxels())
+                           ? static_cast<double>(std::ssize(slot_of_point_))
                            : 3.0 * static_cast<double>(result.rays);
   if (result.rays == 0) return result;
   result.loss = loss_sum / count;

@@ -7,7 +7,7 @@
 // Geometry is frozen, so w_i and T_r are constants. LipRF's Algorithm 1 sends every voxel
 // through f; a voxel that no ray touches has gradient zero, so sending the touched ones alone
 // gives the same gradient. The paper's text also allows 1 / B in place of 1 / (3 Q), B the
-// number of voxels.
+// number of what f maps: voxels and texels of the background.
 //
 // With view_weight > 0 the loss has a second term, see EQ(view-penalty), and so has the
 // gradient.

@@ -82,7 +82,7 @@ RadianceField WeightField(const RadianceField& field, const std::vector<float>& 
   RadianceField result;
   result.geometry = field.geometry;
   result.near_clip = field.near_clip;
-  result.step = field.step;
+  result.march = field.march;
   result.appearance.basis = 1;
   result.appearance.sh.Resize(std::ssize(weights) * 3);
   for (size_t v = 0; v < weights.size(); ++v)

@@ -32,7 +32,7 @@ void AddResidualRays(const RadianceField& field, const Camera& camera, const Ima
   constexpr int64_t kBand = 16384;
   const Geometry& geometry = *field.geometry;
   const std::unique_ptr<RayWeigher> weigher =
-      MakeRayWeigher(geometry, field.near_clip, MarchOptions{field.step}, kLeastWeight);
+      MakeRayWeigher(geometry, field.near_clip, field.march, kLeastWeight);
   struct Entry {
     int32_t voxel;
     float weight;

@@ -249,8 +249,7 @@ void Add(double source, double styled, double k, VarianceGroup* group) {
 
 VarianceReport MeasureVariance(const RadianceField& source, const RadianceField& styled,
                                const LipschitzNetwork& network, const RayPairs& pairs,
-                               RayWeigher* weigher,
-                               const std::vector<float>* object_weights) {
+                               RayWeigher* weigher, const std::vector<float>* object_weights) {
   if (object_weights != nullptr)
     REGRADE_CHECK_EQ(std::ssize(*object_weights), source.geometry->num_voxels());
   const RayWeights weights = weigher->Weigh(pairs);

@@ -64,11 +64,10 @@ struct WeightUpdateOptions {
          {.help = "ablation: no Lipschitz regularisation: closer to the 2D method, and noisier "
                   "where its views disagree; only --style-bound limits the bound",
           .constant = true});
-    bind(
-        "style-spectral-normalisation", spectral_normalisation,
-        {.help = "ablation: every layer's norm is 1, which is the bound of the paper's recipe; "
-                 "smoothest, and weakest in colour",
-         .constant = true});
+    bind("style-spectral-normalisation", spectral_normalisation,
+         {.help = "ablation: every layer's norm is 1, or as much less as --style-bound asks; "
+                  "smoothest, and weakest in colour",
+          .constant = true});
   }
 };
 
@@ -94,7 +93,7 @@ struct WeightUpdate {
   // All K_i of `layers` layers are multiplied by this after a step; `bound` is the residual's.
   HD double LimitFactor(double bound, int layers) const {
     using std::pow;
-    if (options.spectral_normalisation || !(bound > bound_limit)) return 1;
+    if (!(bound > bound_limit)) return 1;
     return pow(bound_limit / bound, 1.0 / layers);
   }
 };

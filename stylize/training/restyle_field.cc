@@ -28,7 +28,7 @@ RestyledField Restyle(RadianceField field, const TrainingTargets& targets,
   if (request.options.map_background && request.object_weights == nullptr)
     field.background = MapBackground(scene_map.map, field.background);
 
-  const MarchOptions march{field.step};
+  const MarchOptions march = field.march;
   const std::unique_ptr<StyleEngine> engine =
       MakeStyleEngine(request.backend, &field, march, request.options);
   finished(Part::kUpload);
@@ -40,7 +40,7 @@ RestyledField Restyle(RadianceField field, const TrainingTargets& targets,
   finished(Part::kTraining);
   Appearance restyled = engine->Restyle(result.trained.network, parts.Next(kAfterTraining));
   result.styled = {field.geometry, std::move(restyled), field.background, field.near_clip,
-                   field.step};
+                   field.march};
   result.source = std::move(field);
   result.source.background = source_background;
   if (request.object_weights != nullptr)

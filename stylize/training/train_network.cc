@@ -212,15 +212,15 @@ StepResult Training::Advance(int64_t most) {
 
 TrainNetworkResult Training::Conclude() {
   if (options_.settle_norms) network_.WarmUpNorms();
+  // The power iteration's norms are a little low; the guarantee is about exact ones.
+  const double excess = network_.ResidualBound() / update_.bound_limit;
+  if (excess > 1) network_.k(kNetworkLayers - 1) *= static_cast<float>((1 - 1e-6) / excess);
   double mse = LossOfSample(network_).Mse();
   if (network_.data().has_base && !(mse <= state_.linear_map_mse)) {
     result_.warnings.push_back("the network did not beat the colour map: that alone is used");
     network_.data().base = BetterMap(&mse);
     ClearLastLayer(&network_);
   }
-  // The power iteration's norms are a little low; the guarantee is about exact ones.
-  const double excess = network_.ResidualBound() / update_.bound_limit;
-  if (excess > 1) network_.k(kNetworkLayers - 1) *= static_cast<float>((1 - 1e-6) / excess);
   result_.bound = network_.Bound();
   const LocalLipschitz local = MeasureLocalLipschitz(network_, field_, {.seed = options_.seed});
   result_.local_lipschitz_sampled = local.OnData();

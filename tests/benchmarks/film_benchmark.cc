@@ -65,7 +65,7 @@ void Compare(const std::string& folder, const std::string& style, int size, int 
   if (before.field.geometry->splats.on()) return TimeSplats(before.field, path);
   const StoredField after = ReadStyledField(folder, folder + "/styles/" + style);
   const FastGrid grid = MakeFastGrid(before.field), other = MakeFastGrid(after.field);
-  const MarchOptions exact{before.field.step}, early{before.field.step, 1e-3f};
+  const MarchOptions exact = before.field.march, early{exact.step, 1e-3f};
   struct Row {
     float tolerance;
     double seconds = 0, worst = 1e9;

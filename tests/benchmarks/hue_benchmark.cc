@@ -44,7 +44,7 @@ std::vector<Image> RendersOf(const RadianceField& field, const std::vector<Camer
   std::vector<Image> pictures;
   const FastGrid grid = MakeFastGrid(field);
   for (const Camera& camera : cameras)
-    pictures.push_back(RenderView(grid, camera, MarchOptions{field.step}).color);
+    pictures.push_back(RenderView(grid, camera, field.march).color);
   return pictures;
 }
 

@@ -32,7 +32,7 @@ std::vector<Image> Renders(const RadianceField& field, const std::vector<Camera>
   std::vector<Image> pictures;
   const FastGrid grid = MakeFastGrid(field);
   for (const Camera& camera : cameras)
-    pictures.push_back(RenderView(grid, camera, MarchOptions{field.step}).color);
+    pictures.push_back(RenderView(grid, camera, field.march).color);
   return pictures;
 }
 

@@ -113,18 +113,6 @@ TEST(Consistency, H114_ErrorIsPerPixelAndChannel) {
   EXPECT_EQ(*ComparePair(a, b, StillMotion(kW, kH)).error, 0);
 }
 
-// The norm of LipRF's eq. 14 and the square of Lai et al.'s program hold the mask; the divisor is
-// its sum.
-TEST(Consistency, ASoftMaskIsSquaredWithTheError) {
-  PairMotion motion = StillMotion(kW, kH);
-  for (float& weight : motion.mask.weight.pixels) weight = 0.25f;
-  *motion.mask.weight.at(0, 0) = 1;
-  const PairResult pair =
-      ComparePair(ConstantImage(kW, kH, 0.5f), ConstantImage(kW, kH, 0.6f), motion);
-  const double others = kW * kH - 1;
-  EXPECT_NEAR(*pair.error, 0.01 * (1 + others / 16) / (1 + others / 4), 1e-8);
-}
-
 // A step to the right by 2 px: the positions that are compared, and the frame that is sampled
 // between pixels, differ by direction.
 TEST(Consistency, TheWarpedFrameIsTheOneAskedFor) {

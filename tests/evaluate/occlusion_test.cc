@@ -127,6 +127,17 @@ double FractionAt(const Image& weight, float value) {
          weight.num_pixels();
 }
 
+// The norm of LipRF's eq. 14 and the square of Lai et al.'s program hold the mask; the divisor
+// is its sum.
+TEST(Occlusion, ASoftMaskIsSquaredWithTheError) {
+  PairMotion motion{FlowField(8, 6), {}};
+  motion.mask.weight = ConstantImage(8, 6, 0.25f, 1);
+  *motion.mask.weight.at(0, 0) = 1;
+  const PairResult pair =
+      ComparePair(ConstantImage(8, 6, 0.5f), ConstantImage(8, 6, 0.6f), motion);
+  EXPECT_NEAR(*pair.error, 0.01 * (1 + 47 / 16.0) / (1 + 47 / 4.0), 1e-8);
+}
+
 TEST(Occlusion, Lai2018AgreesWithALiteralTranscription) {
   for (uint64_t seed = 0; seed < 4; ++seed) {
     const int w = 83 + static_cast<int>(seed), h = 71;

@@ -56,7 +56,8 @@ bool ReadField(std::string_view bytes) {
     const Vec3f center = stored.field.geometry->frame.center,
                 radius = stored.field.geometry->frame.radius;
     camera.camera_from_world.translation = {-center.x, -center.y, 2.0 * radius.z - center.z};
-    const RenderedView view = RenderView(stored.field, camera, {stored.field.step, 1e-3f});
+    const RenderedView view =
+        RenderView(stored.field, camera, {stored.field.march.step, 1e-3f});
     for (const float value : view.color.pixels)
       FuzzRequire(value >= 0 && value <= 1, "its colours are in [0, 1]");
   });

@@ -78,7 +78,7 @@ class ColorCopies : public testing::PictureTest {
     const WorkingViews views = ReadWorkingViews(out + "/poses", 96, 0).InField(stored);
     Image renders(96, 0, 3);
     for (const Camera& camera : views.Cameras()) {
-      const Image render = RenderView(stored.field, camera, {stored.field.step}).color;
+      const Image render = RenderView(stored.field, camera, stored.field.march).color;
       renders.height += render.height;
       renders.pixels.insert(renders.pixels.end(), render.pixels.begin(), render.pixels.end());
     }

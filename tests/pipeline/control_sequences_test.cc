@@ -141,9 +141,7 @@ struct ExposedViews {
 
   FrameSource Rendered(const RadianceField& field) const {
     return {static_cast<int>(cameras.size()), [this, field](int i) {
-              return RenderView(field, cameras[static_cast<size_t>(i)],
-                                MarchOptions{field.step})
-                  .color;
+              return RenderView(field, cameras[static_cast<size_t>(i)], field.march).color;
             }};
   }
 };

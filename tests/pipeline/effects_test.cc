@@ -72,7 +72,7 @@ std::string DigestOf(const StoredField& stored, const Camera& camera) {
   Add(stored.field.appearance.sh, &hasher);
   const RenderedView view =
       RenderView(stored.field, WorkingCamera(camera, 96, stored.field_from_world, stored.ndc),
-                 {stored.field.step});
+                 stored.field.march);
   hasher.Add(view.color.pixels.data(), view.color.pixels.size() * sizeof(float));
   return HashText(hasher.Value());
 }

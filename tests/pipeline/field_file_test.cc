@@ -237,7 +237,7 @@ TEST(FieldFile, RoundTripInSvox2sLayoutKeepsRenders) {
     StoredField ours{testing::RandomField({12, 14, 10}, 9, 0.6, 5), {}, {}};
     if (background) testing::AddSpheres(6, 8, 0.5, 9, &ours.field);
     const auto render = [&camera](const StoredField& stored) {
-      return RenderView(stored.field, camera, {stored.field.step}).color;
+      return RenderView(stored.field, camera, stored.field.march).color;
     };
     WriteForeign(ours.field, folder / "svox2.npz");
     const StoredField foreign = ReadFieldFile(folder / "svox2.npz");

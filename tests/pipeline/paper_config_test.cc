@@ -174,6 +174,7 @@ TEST(PaperConfig, ResolvedSettingsAreThePublishedOnes) {
       EXPECT_FLOAT_EQ(fit.tv_density * decay, static_cast<float>(p.tv_density[s])) << s;
       EXPECT_FLOAT_EQ(fit.tv_sh * decay, static_cast<float>(p.tv_sh[s])) << s;
     }
+    EXPECT_EQ(fit.ball || background, std::string(p.name) != "llff");
     EXPECT_EQ(fit.tv_fraction, 0.01f);
     EXPECT_EQ(fit.sparsity_loss, static_cast<float>(p.sparsity));
     EXPECT_EQ(fit.beta_loss, static_cast<float>(p.beta));
@@ -228,8 +229,7 @@ TEST(PaperConfig, TheChoiceKeepsWhatWasSetByHand) {
 TEST(PaperConfig, TheStyleAndTheProtocolAreOfTheLetter) {
   const auto named = [](const std::vector<std::string>& arguments) {
     std::vector<std::string> options;
-    for (const std::string& difference :
-         NotToTheLetter(kPaperBase, StyleValues(Of(arguments))))
+    for (const std::string& difference : NotToTheLetter(kPaperBase, StyleValues(Of(arguments))))
       options.push_back(difference.substr(0, difference.find(' ')));
     return options;
   };

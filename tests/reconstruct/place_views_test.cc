@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "kernels/splats/splat_field.h"
+#include "reconstruct/views/probe_view.h"
 #include "reconstruct/views/scene_up.h"
 #include "reconstruct/views/splat_extent.h"
 #include "tests/support/expect_error.h"
@@ -61,13 +62,15 @@ class SceneMaker {
   std::vector<Splat<float>> all_;
 };
 
-PlacedViews Place(const Splats& splats, const Vec3d& up) {
+RadianceField FieldOf(const Splats& splats) {
   const SplatExtent extent = ExtentOf(splats);
   const auto radius = static_cast<float>(extent.radius);
-  const FieldRenderer renderer(
-      FieldOfSplats(splats, {{}, extent.center.Cast<float>(), {radius, radius, radius}}, 0, -1),
-      Backend::kCpu);
-  return PlaceViews(splats, renderer, up, 96, "scene.ply", {});
+  return FieldOfSplats(splats, {{}, extent.center.Cast<float>(), {radius, radius, radius}}, 0,
+                       -1);
+}
+
+PlacedViews Place(const Splats& splats, const Vec3d& up) {
+  return PlaceViews(splats, FieldOf(splats), Backend::kCpu, up, 96, "scene.ply", {});
 }
 
 TEST(SceneUp, AGroundTurnsTheConventionToIt) {
@@ -151,6 +154,28 @@ TEST(PlaceViews, SurroundingsAreSeenFromWithin) {
     EXPECT_LT(Norm(camera.Center()), 10);
     EXPECT_LT(camera.Center().y, 1.2);
   }
+}
+
+// A part of the splats, enlarged, hides as much at the same depths.
+TEST(PlaceViews, ProbesOfManySplatsSeeTheSurface) {
+  SceneMaker scene;
+  scene.Ball({0, 0, 0}, 1, 9000);
+  const Splats splats = scene.Make();
+  const RadianceField all = FieldOf(splats), some = FieldForProbes(splats, all, 2000);
+  EXPECT_EQ(some.geometry->num_voxels(), 1800);
+  EXPECT_EQ(FieldForProbes(splats, all, 9000).geometry->num_voxels(), 9000);
+  Camera camera;
+  camera.width = camera.height = 48;
+  camera.fx = camera.fy = 48, camera.cx = camera.cy = 24;
+  camera.camera_from_world.translation = {0, 0, 3};
+  const RenderedView exact = FieldRenderer(all, Backend::kCpu).Render(camera),
+                     probe = FieldRenderer(some, Backend::kCpu).Render(camera);
+  for (int y = 0; y < 48; ++y)
+    for (int x = 0; x < 48; ++x)
+      if (*exact.transmittance.at(x, y) < 0.01f && std::hypot(x - 23.5, y - 23.5) < 14) {
+        EXPECT_LT(*probe.transmittance.at(x, y), 0.1f);
+        EXPECT_NEAR(*probe.depth.at(x, y), *exact.depth.at(x, y), 0.1);
+      }
 }
 
 TEST(PlaceViews, NothingToSeeIsRefused) {

@@ -49,7 +49,7 @@ std::vector<Camera> Cameras() {
 std::vector<Image> Renders(const RadianceField& field) {
   std::vector<Image> pictures;
   for (const Camera& camera : Cameras())
-    pictures.push_back(RenderView(field, camera, MarchOptions{field.step}).color);
+    pictures.push_back(RenderView(field, camera, field.march).color);
   return pictures;
 }
 

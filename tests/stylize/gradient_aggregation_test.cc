@@ -200,16 +200,25 @@ TEST(GradientAggregation, EveryVoxelGivesTheSameGradient) {
   EXPECT_LE(RelativeDifference(all, touched), 1e-6);
 }
 
-TEST(GradientAggregation, PaperSumDividesByVoxels) {
-  const RadianceField field = Ball(8);
+// By all that the network maps, the texels of the background among it.
+TEST(GradientAggregation, PaperSumDividesByPoints) {
+  RadianceField field = Ball(8);
+  const int64_t voxels = field.geometry->num_voxels();
+  AddSpheres(2, 4, 1.0, 4, &field);
   const StyleRays batch = SomeRays(1, 8);
   const LipschitzNetwork network = RandomNetwork(92);
   GradientAggregation mean(field, {});
   GradientAggregation sum(field, {.divide_by_voxels = true});
   const double ratio = 3.0 * static_cast<double>(batch.rays.size()) /
-                       static_cast<double>(field.geometry->num_voxels());
+                       static_cast<double>(voxels + field.geometry->spheres.num_texels());
+  EXPECT_GT(field.geometry->spheres.num_texels(), 0);
   EXPECT_NEAR(sum.Run(network, batch, nullptr).loss / mean.Run(network, batch, nullptr).loss,
               ratio, 1e-12);
+  std::vector<double> of_mean = NoGradient(), of_sum = NoGradient();
+  mean.Run(network, batch, &of_mean);
+  sum.Run(network, batch, &of_sum);
+  for (double& value : of_mean) value *= ratio;
+  EXPECT_LE(RelativeDifference(of_sum, of_mean), 1e-12);
 }
 
 TEST(GradientAggregation, H48_PatchesSumToTheWhole) {

@@ -35,7 +35,8 @@ RadianceField HardBall() {
 TEST(RayPairs, BothRaysEndAtOnePoint) {
   const RadianceField ball = HardBall();
   const std::vector<Camera> cameras = Ring(9, 60);  // 40 degrees apart
-  const RayPairs pairs = PixelsOfOnePoint(ball, cameras, 1000, 3, MarchOptions{}, ExactWeigher(ball).get());
+  const RayPairs pairs =
+      PixelsOfOnePoint(ball, cameras, 1000, 3, MarchOptions{}, ExactWeigher(ball).get());
   ASSERT_GT(pairs.size(), 1000);  // of 4000 pixels, two thirds on the ball
   for (size_t i = 0; i < pairs.rays.size(); i += 2) {
     const Vec3d a = EndOf(ball, pairs.rays[i]), b = EndOf(ball, pairs.rays[i + 1]);
@@ -123,8 +124,8 @@ TEST(VolumeVariance, PairsOnSpheresAreAGroupAndDifferAsRendered) {
   AddSpheres(3, 8, 1.0, 4, &scene.source);
   scene.Style();
   const RayPairs pairs = NeighbouringPixels(scene.cameras, 2000, 3);
-  const VarianceReport report =
-      MeasureVariance(scene.source, scene.styled, scene.network, pairs, ExactWeigher(scene.source).get());
+  const VarianceReport report = MeasureVariance(scene.source, scene.styled, scene.network,
+                                                pairs, ExactWeigher(scene.source).get());
   EXPECT_EQ(report.Pairs(), 2000);
   EXPECT_GT(report.spheres.pairs, 500);
   EXPECT_GT(report.valid.pairs, 200);
@@ -141,9 +142,10 @@ TEST(VolumeVariance, PairsOnSpheresAreAGroupAndDifferAsRendered) {
 TEST(VolumeVariance, PixelsOfOnePointStayBelowTheBound) {
   Surrounded scene;
   scene.Style();
-  const RayPairs pairs = PixelsOfOnePoint(scene.source, scene.cameras, 2000, 3, MarchOptions{}, ExactWeigher(scene.source).get());
-  const VarianceReport report =
-      MeasureVariance(scene.source, scene.styled, scene.network, pairs, ExactWeigher(scene.source).get());
+  const RayPairs pairs = PixelsOfOnePoint(scene.source, scene.cameras, 2000, 3, MarchOptions{},
+                                          ExactWeigher(scene.source).get());
+  const VarianceReport report = MeasureVariance(scene.source, scene.styled, scene.network,
+                                                pairs, ExactWeigher(scene.source).get());
   EXPECT_GT(report.valid.pairs, 500);
   EXPECT_LE(report.largest_fraction, 1 + 1e-4);
   EXPECT_GT(report.largest_fraction, 0.05);
@@ -163,8 +165,9 @@ TEST(VolumeVariance, AnObjectsBoundIsThatOfItsWholeVoxels) {
   const RadianceField whole = scene.styled;
   scene.styled = MixFields(scene.source, {&whole}, {1}, &weights);
   const RayPairs pairs = NeighbouringPixels(scene.cameras, 3000, 3);
-  const VarianceReport report = MeasureVariance(scene.source, scene.styled, scene.network,
-                                                pairs, ExactWeigher(scene.source).get(), &weights);
+  const VarianceReport report =
+      MeasureVariance(scene.source, scene.styled, scene.network, pairs,
+                      ExactWeigher(scene.source).get(), &weights);
   EXPECT_GT(report.valid.pairs, 50);  // opaque, on the whole half
   EXPECT_GT(report.partial.pairs, 200);
   EXPECT_LE(report.largest_fraction, 1 + 1e-4);
@@ -172,7 +175,8 @@ TEST(VolumeVariance, AnObjectsBoundIsThatOfItsWholeVoxels) {
   // What is not of the object does not change.
   const std::vector<float> none(weights.size(), 0.0f);
   const VarianceReport outside =
-      MeasureVariance(scene.source, scene.source, scene.network, pairs, ExactWeigher(scene.source).get(), &none);
+      MeasureVariance(scene.source, scene.source, scene.network, pairs,
+                      ExactWeigher(scene.source).get(), &none);
   EXPECT_EQ(outside.valid.pairs, 0);
   EXPECT_EQ(outside.partial.above, 0);
   EXPECT_NEAR(outside.partial.Gain(), 1, 1e-12);

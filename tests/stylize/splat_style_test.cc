@@ -337,7 +337,8 @@ TEST_P(SplatStyleOf, PairsStayBelowTheirBound) {
   for (size_t i = 0; i < points.rays.size(); i += 2)
     EXPECT_NE(points.places[i].camera, points.places[i + 1].camera);
   for (const RayPairs& pairs : {neighbours, points}) {
-    const VarianceReport report = MeasureVariance(source, styled, network, pairs, weigher.get());
+    const VarianceReport report =
+        MeasureVariance(source, styled, network, pairs, weigher.get());
     EXPECT_GT(report.valid.pairs, 200);
     EXPECT_GT(report.largest_fraction, 0.05);
     EXPECT_LE(report.largest_fraction, 1 + 1e-4);  // float's rounding of coefficients
@@ -348,12 +349,14 @@ TEST_P(SplatStyleOf, PairsStayBelowTheirBound) {
   RadianceField clear = source, clear_styled = styled;
   clear.geometry = clear_styled.geometry = thin;
   clear_styled.background = {0.7f, 0.1f, 0.5f};
-  const VarianceReport report = MeasureVariance(clear, clear_styled, network, neighbours, ExactWeigher(clear).get());
+  const VarianceReport report =
+      MeasureVariance(clear, clear_styled, network, neighbours, ExactWeigher(clear).get());
   EXPECT_GT(report.transparent.pairs, 1000);
   EXPECT_GT(report.largest_fraction, 0.1);
   EXPECT_LE(report.largest_fraction, 1 + 1e-4);
   const Threads single(1);
-  EXPECT_EQ(PixelsOfOnePoint(source, cameras, 2000, 3, {}, weigher.get()).size(), points.size());
+  EXPECT_EQ(PixelsOfOnePoint(source, cameras, 2000, 3, {}, weigher.get()).size(),
+            points.size());
 }
 
 // --- positions

@@ -182,9 +182,9 @@ TEST(VoxelResidual, RaysSeeWhatTheRendererSees) {
   const std::vector<Vec3d> x = RandomColors(field.geometry->num_voxels(), 0.2, 2);
   std::vector<Vec3f> colors;
   for (const Vec3d& v : x) colors.push_back(v.Cast<float>());
-  const Image before = RenderView(field, camera, MarchOptions{field.step}).color;
+  const Image before = RenderView(field, camera, field.march).color;
   AddResidual({colors, {}}, &field.appearance);
-  const Image after = RenderView(field, camera, MarchOptions{field.step}).color;
+  const Image after = RenderView(field, camera, field.march).color;
   const std::vector<Vec3d> seen = SumAlongRays(rays, x);
   double largest = 0, error = 0;
   for (int64_t i = 0; i < before.num_pixels(); ++i)

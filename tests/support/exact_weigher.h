@@ -9,7 +9,7 @@ namespace regrade {
 
 // The field must outlive it.
 inline std::unique_ptr<RayWeigher> ExactWeigher(const RadianceField& field) {
-  return MakeRayWeigher(*field.geometry, field.near_clip, MarchOptions{field.step});
+  return MakeRayWeigher(*field.geometry, field.near_clip, field.march);
 }
 
 }  // namespace regrade
