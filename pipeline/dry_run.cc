@@ -61,6 +61,24 @@ JsonValue ToJson(const PlannedStage& planned) {
   return json;
 }
 
+// What the configurations ask for that auto takes of other captures than the base's.
+void SayOtherConfigs(RunContext* context) {
+  for (const char* name : {"llff", "syn"}) {
+    RunSettings other = context->settings;
+    OptionSet options;
+    other.Bind(&options);
+    ApplyPaperChoice({name, ""}, &options);
+    std::string text = Concat("as ", name, ": ");
+    for (const StageEstimate& stage : EstimateStages(
+             other, SizeOfSource(context),
+             ChooseBackend(other.run.device, other.run.reproducible), omp_get_max_threads()))
+      if (stage.stage == "reconstruct" || stage.stage == "stylize")
+        text += Concat(stage.stage == "stylize" ? ", " : "", stage.stage, " ",
+                       PlanText({stage.memory, stage.seconds}));
+    context->console->Info(text);
+  }
+}
+
 // The poses decide which configuration auto takes; until then it is the base.
 void SayPaperConfig(RunContext* context) {
   RunSettings& settings = context->settings;
@@ -72,6 +90,7 @@ void SayPaperConfig(RunContext* context) {
                          (asked ? ", as --paper-config says"
                                 : ", unless the photos are transparent (syn) or all look one "
                                   "way (llff)"));
+  if (!asked) SayOtherConfigs(context);
   for (const JsonValue& values : {DecidedValues(settings), StyleValues(settings)})
     for (const std::string& difference : NotToTheLetter(name, values))
       context->console->Info("not to the letter: " + difference);

@@ -85,6 +85,7 @@ def metrics_of(folder):
         "tc": [steady[gap] for gap in sorted(steady)],
         "gaps": sorted(steady),
         "bound": stylize["bound"],
+        "balance": stylize.get("loss_balance"),
         "k_est": stylize["k_est"],
         "local_lipschitz_sampled": stylize["local_lipschitz_sampled"],
         "local_lipschitz_max": stylize.get("local_lipschitz_max"),
@@ -108,12 +109,12 @@ def ratio(value, whole):
 def table(rows):
     gaps = rows[0][2]["gaps"]
     head = ["recipe", "variant", "styled to 2D, dB", "to 2D of the photos, dB"] + [f"TC-PSNR gap {gap}, dB" for gap in gaps]
-    head += ["bound at the start", "bound", "local Lipschitz, sampled", "maximum by gradient ascent", "K_est", "hue spread kept", "chroma kept", "s"]
+    head += ["3 Q / B", "bound at the start", "bound", "local Lipschitz, sampled", "maximum by gradient ascent", "K_est", "hue spread kept", "chroma kept", "s"]
     lines = ["| " + " | ".join(head) + " |", "|" + "---|" * len(head)]
     for recipe, variant, f in rows:
         cells = [recipe, variant, number(f["psnr_to_2d_db"]), number(f["psnr_to_2d_photos_db"])] + [number(tc) for tc in f["tc"]]
         start = f["bound_at_steps"][0][1] if f["bound_at_steps"] else None
-        cells += [number(start), number(f["bound"]), number(f["local_lipschitz_sampled"]), number(f["local_lipschitz_max"]), number(f["k_est"])]
+        cells += [number(f["balance"], 3), number(start), number(f["bound"]), number(f["local_lipschitz_sampled"]), number(f["local_lipschitz_max"]), number(f["k_est"])]
         cells += [ratio(f["hue_std"], f["hue_std_2d"]), ratio(f["chroma"], f["chroma_2d"]), number(f["seconds"], 0)]
         lines.append("| " + " | ".join(cells) + " |")
     return "\n".join(lines)

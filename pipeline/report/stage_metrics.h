@@ -188,6 +188,8 @@ struct StylizeReport {
   Metric local_lipschitz_of_map, local_lipschitz_along_coefficients,
       local_lipschitz_along_position;
   Curve bound_at_steps;
+  // 3 Q / B of a step, of the paper's sum over voxels.
+  std::optional<double> loss_balance;
   std::optional<int64_t> object_voxels;
   // Of neighbouring pixels of a view, and of pixels of two views that see one point.
   std::optional<VarianceMetrics> variance, variance_across_views;
@@ -211,6 +213,7 @@ struct StylizeReport {
     visit("local_lipschitz_along_coefficients", local_lipschitz_along_coefficients);
     visit("local_lipschitz_along_position", local_lipschitz_along_position);
     visit("bound_at_steps", bound_at_steps);
+    visit("loss_balance", loss_balance, {.label = "3 Q / B of the summed loss", .decimals = 3});
     visit("object_voxels", object_voxels, {.label = "voxels of the object"});
     visit("variance", variance);
     visit("variance_across_views", variance_across_views);

@@ -158,8 +158,11 @@ StagePlan PlanTracks(int64_t photos, int threads) {
   return {0, SecondsWith(kTrackSecondsPerPhoto * static_cast<double>(photos), threads)};
 }
 
-StagePlan PlanStyle(int64_t steps, int threads) {
-  return {0, SecondsWith(kStyleSecondsPerStep * static_cast<double>(steps), threads)};
+StagePlan PlanStyle(const TrainNetworkOptions& options, double view_pixels, int threads) {
+  const double rays = options.rays_per_step > 0 ? options.rays_per_step : view_pixels;
+  const double step =
+      kStyleSecondsPerStep * std::pow(std::max(1.0, rays / kStyleRateRays), kStyleRateGrowth);
+  return {0, SecondsWith(step * options.steps, threads)};
 }
 
 std::string PlanText(const StagePlan& plan) {

@@ -18,6 +18,7 @@
 #include "reconstruct/fit/fit_options.h"
 #include "reconstruct/scene/scene_box.h"
 #include "reconstruct/splats/splat_fit_options.h"
+#include "stylize/training/train_network_options.h"
 
 namespace regrade {
 
@@ -30,7 +31,9 @@ inline constexpr double kRaysPerSecond = 105e3;  // 80 to 138 on three captures
 inline constexpr double kRateResolution = 160;
 inline constexpr double kDeviceSamplesPerSecond =
     4e8;  // of an H200, fit and step together: 270 to 450 on three captures
-inline constexpr double kStyleSecondsPerStep = 0.075;  // with two threads
+// With two threads, of a step of kStyleRateRays; of a whole view, see PlanStyle.
+inline constexpr double kStyleSecondsPerStep = 0.075;
+inline constexpr double kStyleRateRays = 4096, kStyleRateGrowth = 0.75;
 inline constexpr double kPoseSecondsPerPhoto = 2;      // COLMAP, with two threads
 inline constexpr double kTrackSecondsPerPhoto = 0.6;   // likewise, with known poses
 
@@ -65,7 +68,9 @@ bool LowerSplatsToMemory(const std::function<StagePlan(const SplatFitOptions&)>&
                          uint64_t limit, SplatFitOptions* options);
 StagePlan PlanPoses(int64_t photos, int threads);
 StagePlan PlanTracks(int64_t photos, int threads);
-StagePlan PlanStyle(int64_t steps, int threads);
+// `view_pixels`: of a photo at working size, which are a step's rays where rays_per_step is 0.
+// More rays share voxels, so that time grows by their number to the power kStyleRateGrowth.
+StagePlan PlanStyle(const TrainNetworkOptions& options, double view_pixels, int threads);
 
 // "about 1.8 GB of memory and 4 min 12 s"
 std::string PlanText(const StagePlan& plan);

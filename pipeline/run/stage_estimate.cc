@@ -103,7 +103,7 @@ std::vector<StageEstimate> EstimateStages(const RunSettings& settings, const Cap
   const double photo = Megapixels(size, settings.scene.photo_size),
                photos = static_cast<double>(size.photos);
   const StagePlan fit = FitPlan(settings, size, backend);
-  double stylize = PlanStyle(settings.network.steps, threads).seconds;
+  double stylize = PlanStyle(settings.network, 1e6 * photo, threads).seconds;
   if (settings.residual.On())
     stylize += Scaled(kOfResidual * kExactFrame * photos * photo, threads);
   return {

@@ -196,6 +196,13 @@ StageOutcome Stylize(RunContext* context, const JsonValue& inputs,
   } else {
     std::filesystem::remove(workspace.Path("object.npz"));  // of an earlier style
   }
+  if (request.options.loss_scale == "sum-over-voxels") {
+    metrics.loss_balance = trained.loss_balance;
+    context->console->Info(Format(
+        "3 Q / B, rays times channels of a step over what the network maps, is %.3g: where it "
+        "is above 1 the regularisation hardly counts",
+        trained.loss_balance));
+  }
   metrics.device = DeviceName(request.backend);
   metrics.notices = restyled.notices;
   for (const std::string& warning : trained.warnings) metrics.notices.push_back(warning);

@@ -207,6 +207,10 @@ StepResult Training::Advance(int64_t most) {
   state_.step += steps.made;
   steps_here_ += steps.made;
   touched_ += steps.touched_voxels;
+  const Geometry& geometry = *field_.geometry;
+  result_.loss_balance =
+      3.0 * static_cast<double>(steps.last.rays) /
+      static_cast<double>(geometry.num_voxels() + geometry.spheres.num_texels());
   return steps;
 }
 

@@ -66,7 +66,11 @@ TEST(Plan, TimeFollowsRaysResolutionAndThreads) {
   EXPECT_NEAR(PlanFit(Fit({160}, {1000}), 0, kCube, 8).seconds, 25, 1e-9);
   EXPECT_NEAR(PlanFit(Fit({80, 320}, {1000, 1000}), 0, kCube, 2).seconds, 250, 1e-9);
   EXPECT_NEAR(PlanPoses(50, 2).seconds, 100, 1e-9);
-  EXPECT_NEAR(PlanStyle(300, 4).seconds, 11.25, 1e-9);
+  TrainNetworkOptions style;
+  style.steps = 300;
+  EXPECT_NEAR(PlanStyle(style, 1e6, 4).seconds, 11.25, 1e-9);
+  style.rays_per_step = 0;  // whole views
+  EXPECT_NEAR(PlanStyle(style, 16 * 4096, 4).seconds, 11.25 * 8, 1e-9);
 }
 
 // Of 17 photos the first, the ninth and the last are held out.
