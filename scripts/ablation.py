@@ -5,7 +5,8 @@
               [--only NAME ...] [-- OPTIONS OF stylize]
 
 DIR is not changed: the reconstruction is copied to FOLDER/NAME for each variant, and `regrade stylize` runs there; a
-finished variant is skipped. Prints a table in Markdown and writes FOLDER/ablation.md, FOLDER/ablation.json (the
+finished variant is skipped. A --config among the OPTIONS, as JSON, is joined with a
+variant's. Prints a table in Markdown and writes FOLDER/ablation.md, FOLDER/ablation.json (the
 metrics) and FOLDER/bound.svg (the Lipschitz bound over the steps, on a logarithmic scale). Exit status: 0, or 1 if a
 run failed.
 
@@ -24,34 +25,35 @@ import sys
 
 from tree_files import read, write
 
+# Name, options that go by --config, and flags.
 VARIANTS = (
-    ("as it is", ()),
-    ("relu", ("--config", '{"style-activation": "relu"}')),
-    ("leaky-relu", ("--config", '{"style-activation": "leaky-relu"}')),
-    ("sigmoid", ("--config", '{"style-activation": "sigmoid"}')),
-    ("tanh", ("--config", '{"style-activation": "tanh"}')),
-    ("without K_est", ("--config", '{"style-no-k-est": true}')),
-    ("without regularisation", ("--config", '{"style-no-regularisation": true}')),
-    ("spectral normalisation", ("--config", '{"style-spectral-normalisation": true}')),
+    ("as it is", {}),
+    ("relu", {"style-activation": "relu"}),
+    ("leaky-relu", {"style-activation": "leaky-relu"}),
+    ("sigmoid", {"style-activation": "sigmoid"}),
+    ("tanh", {"style-activation": "tanh"}),
+    ("without K_est", {"style-no-k-est": True}),
+    ("without regularisation", {"style-no-regularisation": True}),
+    ("spectral normalisation", {"style-spectral-normalisation": True}),
 )
 # Interpretations of the paper's text, and choices that it does not specify.
 READINGS = (
-    ("as it is", ()),
-    ("mean over rays", ("--config", '{"style-loss": "mean"}')),
-    ("norms settle", ("--config", '{"style-settle-norms": true}')),
-    ("no hidden biases", ("--config", '{"style-hidden-bias": false}')),
-    ("views in passes", ("--config", '{"style-view-order": "passes"}')),
-    ("300 passes", ("--config", '{"style-view-order": "passes"}', "--style-steps", "300 VIEWS")),
-    ("1000 steps", ("--style-steps", "1000")),
-    ("rate 3e-3, 1000 steps", ("--config", '{"style-rate": 0.003, "style-rate-last": 3e-05}', "--style-steps", "1000")),
-    ("starts as SIREN", ("--config", '{"style-start": "siren"}')),
-    ("starts as SIREN, wide last layer", ("--config", '{"style-start": "siren-wide-end"}')),
-    ("starts as SIREN, layers alike", ("--config", '{"style-start": "siren-even"}')),
-    ("starts orthogonal", ("--config", '{"style-start": "orthogonal"}')),
-    ("starts at the identity", ("--config", '{"style-start": "identity"}')),
-    ("another seed", ("--seed", "1")),
-    ("a third seed", ("--seed", "2")),
-    ("starts at the colour map", ("--config", '{"style-base": "best"}')),
+    ("as it is", {}),
+    ("mean over rays", {"style-loss": "mean"}),
+    ("norms settle", {"style-settle-norms": True}),
+    ("no hidden biases", {"style-hidden-bias": False}),
+    ("views in passes", {"style-view-order": "passes"}),
+    ("300 passes", {"style-view-order": "passes"}, "--style-steps", "300 VIEWS"),
+    ("1000 steps", {}, "--style-steps", "1000"),
+    ("rate 3e-3, 1000 steps", {"style-rate": 0.003, "style-rate-last": 3e-05}, "--style-steps", "1000"),
+    ("starts as SIREN", {"style-start": "siren"}),
+    ("starts as SIREN, wide last layer", {"style-start": "siren-wide-end"}),
+    ("starts as SIREN, layers alike", {"style-start": "siren-even"}),
+    ("starts orthogonal", {"style-start": "orthogonal"}),
+    ("starts at the identity", {"style-start": "identity"}),
+    ("another seed", {}, "--seed", "1"),
+    ("a third seed", {}, "--seed", "2"),
+    ("starts at the colour map", {"style-base": "best"}),
 )
 KEPT = ("poses", "field.npz", "run.json", ".regrade")
 STAGES_KEPT = ("pose.json", "reconstruct.json")
@@ -184,15 +186,20 @@ def main():
         if not os.path.exists(os.path.join(options.folder, name)):
             parser.error(f"{options.folder} has no {name}: make it with `regrade run`")
     variants = READINGS if options.readings else VARIANTS
-    names = [name for name, _ in variants]
+    names = [name for name, *_ in variants]
     wanted = options.only or names
     for name in wanted:
         if name not in names:
             parser.error(f"there is no variant '{name}'; there are: " + ", ".join(names))
+    given = {}
+    while "--config" in extra:
+        at = extra.index("--config")
+        given.update(json.loads(extra[at + 1]))
+        del extra[at:at + 2]
     registered = json.loads(read(options.folder, ".regrade/stages/pose.json"))["metrics"]["registered"]
     rows = []
     for recipe in options.recipes.split(","):
-        for name, flags in variants:
+        for name, config, *flags in variants:
             if name not in wanted:
                 continue
             folder = os.path.join(options.work, f"{recipe} {name}".replace(" ", "_").replace(",", ""))
@@ -203,6 +210,7 @@ def main():
                 command += ["--style", options.style]
             if options.steps:
                 command += ["--style-steps", str(options.steps)]
+            command += ["--config", json.dumps({**given, **config})]
             # "300 VIEWS": as many times the number of registered photos.
             command += [str(int(word.split()[0]) * registered) if word.endswith(" VIEWS") else word for word in flags]
             print(f"{recipe}, {name} ...", file=sys.stderr, flush=True)

@@ -1,12 +1,13 @@
 #!/usr/bin/env python3
 """Writes the tables of a benchmark from the reports of its runs.
 
-  make_table.py WORK [SCENE=ROLE...] [--results PAGE --commit TEXT]
+  make_table.py WORK [SCENE=ROLE...] [--results PAGE --commit TEXT] [--as-printed]
 
 Reads WORK/runs/SCENE/STYLE/METHOD/SEED/styles/style/report.json and WORK/foreign/...; writes WORK/table.csv with every run, and
 WORK/table.md and table.tex with means over styles and seeds, each with the standard deviation between seeds. ROLE says whether
 settings were chosen on the scene. PAGE gets the tables between its lines "<!-- core -->" and "<!-- end of core -->", with the
-machine, TEXT and the time that the runs took. Exit status: 0, or 1 without a finished run or without these lines.
+machine, TEXT and the time that the runs took. --as-printed writes WORK/table1.md and table1.tex, too: scenes as columns, as LipRF's Table 1,
+with the differences to its numbers. Exit status: 0, or 1 without a finished run or without these lines.
 """
 
 import csv
@@ -15,7 +16,7 @@ import os
 import statistics
 import sys
 
-COLUMNS = ["scene", "style", "method", "seed", "motion", "heldout_db", "heldout_ssim", "short_db", "long_db", "to_2d_db", "linear_map_db",
+COLUMNS = ["scene", "style", "method", "seed", "motion", "flow", "heldout_db", "heldout_ssim", "short_db", "long_db", "to_2d_db", "linear_map_db",
            "hue_spread", "chroma", "structure", "distance_to_style", "k_est", "bound", "local_lipschitz_sampled", "seconds"]
 SHOWN = [("short_db", "TC short", 2), ("long_db", "TC long", 2), ("to_2d_db", "to 2D", 2), ("linear_map_db", "linear map to 2D", 2),
          ("hue_spread", "hue spread", 3), ("structure", "structure", 3), ("seconds", "s", 1)]
@@ -52,7 +53,7 @@ def rows_of(scene, style, method, seed, report):
             continue
         near = next((f for f in report.get("fidelity", []) if f["sequence"] == sequence), {})
         row = {"scene": scene, "style": style, "method": names.get(sequence, method), "seed": seed,
-               "motion": evaluate.get("mask"),
+               "motion": evaluate.get("mask"), "flow": evaluate.get("flow"),
                "short_db": tc.get((sequence, gaps[0])), "long_db": tc.get((sequence, gaps[-1])),
                "structure": near.get("structure"), "distance_to_style": near.get("sliced_wasserstein_to_style")}
         if sequence == "source":
@@ -123,10 +124,29 @@ def markdown(head, lines):
     return "\n".join("| " + " | ".join(cells) + " |" for cells in [head, ["---"] * len(head)] + lines) + "\n"
 
 
-def latex(head, lines):
+def as_printed(rows):
+    """Head and lines of LipRF's Table 1: range, method, each scene, their mean; in brackets what is above the printed value."""
+    with open(os.path.join(os.path.dirname(os.path.abspath(__file__)), "published.csv"), newline="") as file:
+        printed = {(row["pairs"], row["method"]): row for row in csv.DictReader(file)}
+    scenes, lines = list(dict.fromkeys(row["scene"] for row in rows)), []
+    for pairs in ("short", "long"):
+        for method in dict.fromkeys(row["method"] for row in rows):
+            some = [row for row in rows if row["method"] == method]
+            cells, values = [], []
+            for scene in scenes:
+                value = mean_and_spread([row for row in some if row["scene"] == scene], pairs + "_db")[0]
+                known = printed.get((pairs, method), {}).get(scene)
+                cells.append(text(value, None, 1) + (f" ({value - float(known):+.1f})" if known and value is not None else ""))
+                values += [value] if value is not None else []
+            flows = " / ".join(sorted({row["flow"] for row in some if row.get("flow")}))
+            lines.append([pairs, method, flows or "--"] + cells + [text(statistics.fmean(values) if values else None, None, 1)])
+    return ["pairs", "method", "flow"] + scenes + ["mean"], lines
+
+
+def latex(head, lines, words=4):
     cell = lambda value: value.replace("_", r"\_").replace("±", r"$\pm$")
     body = [" & ".join(cell(value) for value in cells) + r" \\" for cells in lines]
-    return "\n".join([r"\begin{tabular}{llll" + "r" * len(SHOWN) + "}", r"\toprule", " & ".join(head) + r" \\", r"\midrule"] +
+    return "\n".join([r"\begin{tabular}{" + "l" * words + "r" * (len(head) - words) + "}", r"\toprule", " & ".join(head) + r" \\", r"\midrule"] +
                      body + [r"\bottomrule", r"\end{tabular}", ""])
 
 
@@ -163,7 +183,7 @@ def write_page(page, body):
 
 def arguments():
     """(work, {scene: role}, page or None, commit)"""
-    words, given = list(sys.argv[1:]), {}
+    words, given = [word for word in sys.argv[1:] if word != "--as-printed"], {}
     for flag in ("--results", "--commit"):
         if flag in words[:-1]:
             at = words.index(flag)
@@ -202,6 +222,12 @@ def main():
                        markdown(["scene", "method", "TC short", "TC long"], of_paper))
     with open(os.path.join(work, "table.tex"), "w") as file:
         file.write(latex(head, lines))
+    if "--as-printed" in sys.argv:
+        printed = as_printed(rows)
+        with open(os.path.join(work, "table1.md"), "w") as file:
+            file.write(markdown(*printed))
+        with open(os.path.join(work, "table1.tex"), "w") as file:
+            file.write(latex(*printed, words=3))
     if page:
         runs = len({(row["scene"], row["style"], row["method"].split(" w/ ")[0].split(",")[0], row["seed"])
                     for row in rows if row["method"] != "no style"})

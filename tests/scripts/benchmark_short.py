@@ -94,6 +94,14 @@ def main():
             text = file.read()
         assert text.startswith("before\n<!-- core -->\n3 runs, ") and text.endswith("\n<!-- end of core -->\nafter\n"), text
         assert cell in text and "old" not in text and " cores" in text, text
+        of_2d = statistics.fmean(tc_of(report, "views_2d", 1) for report in reports)
+        # LipRF's table of the same runs, as if the scene were its fern.
+        shutil.move(os.path.join(work, "runs/table"), os.path.join(work, "runs/fern"))
+        subprocess.run([sys.executable, os.path.join(ROOT, "scripts/benchmark/make_table.py"), work, "--as-printed"], check=True)
+        with open(os.path.join(work, "table1.md")) as file:
+            printed = file.read()
+        assert f"| short | MKL | dis-medium | {of_2d:.1f} ({of_2d - 28.4:+.1f}) |" in printed, printed
+        shutil.move(os.path.join(work, "runs/fern"), os.path.join(work, "runs/table"))
         frames = [len(glob.glob(os.path.join(work, place, "*.png"))) for place in
                   ("example/table/sunset", "runs/table/sunset/MKL/0/styles/style/frames/source")]
         assert frames[0] == frames[1] == 10, frames
