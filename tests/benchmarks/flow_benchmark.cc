@@ -20,9 +20,8 @@
 namespace regrade {
 namespace {
 
-const std::vector<std::string> kMethods = {"dis-ultrafast", "dis-fast",  "dis-medium",
-                                           "dis-tuned",     "farneback", "deepflow",
-                                           "tvl1",          "pca-flow",  "rlof"};
+const std::vector<std::string> kMethods = {"dis-ultrafast", "dis-fast", "dis-medium",
+                                           "dis-tuned", "farneback"};
 
 // Sums over pairs of frames; printed as means.
 struct Mean {
