@@ -20,9 +20,9 @@ struct PairResult {
   int from = 0, to = 0;  // frame indices
 
   // EQ(tc-psnr), Lai et al. 2018: e = sum_x |M(x) (O_b(x + f(x)) - O_a(x))|^2 / (C sum_x M(x)),
-  // the mean squared error over trusted pixels x of frame a and the C = 3 colour channels. f
-  // and M are flow from a to b and mask of the reference frames; O is sampled bilinearly with
-  // repeated border, values as given (white = 1, not clipped). b is the frame that is warped:
+  // over trusted pixels x of frame a and the C = 3 colour channels. f and M are flow from a to
+  // b and mask of the reference frames; O is sampled bilinearly with repeated border, values as
+  // given (white = 1, not clipped). b is the frame that is warped:
   // the later one, or with `--warp earlier` the earlier one. `--error-per pixel` leaves C out:
   // every value is 10 log10 3 = 4.77 dB lower. Empty if no pixel can be compared.
   std::optional<double> error;

@@ -91,7 +91,8 @@ void SayPaperConfig(RunContext* context) {
                                 : ", unless the photos are transparent (syn) or all look one "
                                   "way (llff)"));
   if (!asked) SayOtherConfigs(context);
-  for (const JsonValue& values : {DecidedValues(settings), StyleValues(settings)})
+  for (const JsonValue& values :
+       {DecidedValues(settings), RecipeValues(settings), ProtocolValues(settings)})
     for (const std::string& difference : NotToTheLetter(name, values))
       context->console->Info("not to the letter: " + difference);
 }

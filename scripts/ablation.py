@@ -5,10 +5,9 @@
               [--only NAME ...] [-- OPTIONS OF stylize]
 
 DIR is not changed: the reconstruction is copied to FOLDER/NAME for each variant, and `regrade stylize` runs there; a
-finished variant is skipped. A --config among the OPTIONS, as JSON, is joined with a
-variant's. Prints a table in Markdown and writes FOLDER/ablation.md, FOLDER/ablation.json (the
-metrics) and FOLDER/bound.svg (the Lipschitz bound over the steps, on a logarithmic scale). Exit status: 0, or 1 if a
-run failed.
+finished variant is skipped. A --config among the OPTIONS is joined with a variant's. Prints a table in Markdown and
+writes FOLDER/ablation.md, FOLDER/ablation.json (the metrics) and FOLDER/bound.svg (the Lipschitz bound over the steps,
+on a logarithmic scale). Exit status: 0, or 1 if a run failed.
 
 The variants follow LipRF's Sec. 6.3: the activation, without K_est, without regularisation, with spectral normalisation
 to 1, each for every recipe. With --readings they are interpretations of the paper's text instead: what its B counts,
@@ -73,6 +72,18 @@ def copy_reconstruction(source, target):
     for name in os.listdir(stages):
         if name not in STAGES_KEPT:
             os.remove(os.path.join(stages, name))
+
+
+def without_configs(words):
+    """(the options that --config names, as JSON or as a file of it, and the other words)"""
+    given, others, words = {}, [], iter(words)
+    for word in words:
+        if not word.startswith("--config"):
+            others.append(word)
+            continue
+        value = word.partition("=")[2] or next(words, "{}")
+        given.update(json.loads(value if value.lstrip().startswith("{") else read(value)))
+    return given, others
 
 
 def metrics_of(folder):
@@ -191,11 +202,7 @@ def main():
     for name in wanted:
         if name not in names:
             parser.error(f"there is no variant '{name}'; there are: " + ", ".join(names))
-    given = {}
-    while "--config" in extra:
-        at = extra.index("--config")
-        given.update(json.loads(extra[at + 1]))
-        del extra[at:at + 2]
+    given, extra = without_configs(extra)
     registered = json.loads(read(options.folder, ".regrade/stages/pose.json"))["metrics"]["registered"]
     rows = []
     for recipe in options.recipes.split(","):

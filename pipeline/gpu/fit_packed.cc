@@ -174,7 +174,7 @@ void FitPacked(const FitPackedOptions& settings, const FitOptions& fit_options,
   hooks.keep_field = !settings.out.empty();
   hooks.measure = [&](FitEngine* engine) {
     const double seconds = ClockSeconds() - fit_start;
-    measured = MeasureHeldOut(engine, capture, {options.step}, settings.frames);
+    measured = MeasureHeldOut(engine, capture, MarchOfField(options), settings.frames);
     stages.push_back(
         JsonValue::Array{seconds, measured.psnr, measured.ssim, measured.detail_kept});
   };

@@ -188,13 +188,13 @@ struct StylizeReport {
   Metric local_lipschitz_of_map, local_lipschitz_along_coefficients,
       local_lipschitz_along_position;
   Curve bound_at_steps;
-  // 3 Q / B of a step, of the paper's sum over voxels.
+  // 3 Q / B of a step, of the paper's sum over what the network maps.
   std::optional<double> loss_balance;
   std::optional<int64_t> object_voxels;
   // Of neighbouring pixels of a view, and of pixels of two views that see one point.
   std::optional<VarianceMetrics> variance, variance_across_views;
   std::vector<std::string> notices;  // about the colour map and the training
-  // Options of the recipe and of the protocol, if the preset is that of the paper.
+  // Options of the recipe, if the preset is that of the paper.
   std::optional<std::vector<std::string>> not_to_the_letter;
 
   template <typename Visit>
@@ -305,6 +305,8 @@ struct EvaluateReport {
   // Of an edit of single photos: the share of the measured pixels that these photos see. What
   // they do not see is in no fidelity.
   std::optional<double> edit_seen = {};
+  // Options of the protocol, if the preset is that of the paper.
+  std::optional<std::vector<std::string>> not_to_the_letter = {};
 
   template <typename Visit>
   void Describe(Visit& visit) {
@@ -313,6 +315,7 @@ struct EvaluateReport {
     visit("warp", warp, {.label = "warped frame", .optional = true});
     visit("error_per", error_per, {.label = "error per", .optional = true});
     visit("protocol", protocol, {.label = "protocol", .optional = true});
+    visit("not_to_the_letter", not_to_the_letter, {.label = "not to the letter"});
     visit("comparison_note", comparison_note, {.optional = true});
     visit("psnr_to_2d_photos_db", psnr_to_2d_photos_db,
           {.label = "PSNR to the styled photos", .unit = "dB"});

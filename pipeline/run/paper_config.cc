@@ -166,8 +166,17 @@ JsonValue PaperValues(const std::string& name) {
   return DecidedValues(settings);
 }
 
-JsonValue StyleValues(const RunSettings& settings) {
-  JsonValue values = OptionValues(settings.network);
+JsonValue RecipeValues(const RunSettings& settings) {
+  JsonValue values = JsonValue::Object();
+  const JsonValue all = OptionValues(settings.network);
+  for (const auto& [option, value] : all.AsObject())
+    if (option != "style-exact-sums" && option != "style-every-voxel")  // the same result
+      values[option] = value;
+  return values;
+}
+
+JsonValue ProtocolValues(const RunSettings& settings) {
+  JsonValue values = JsonValue::Object();
   const JsonValue evaluated = OptionValues(settings.consistency);
   for (const char* option : {"mode", "gaps", "warp"}) values[option] = evaluated.At(option);
   return values;
@@ -210,14 +219,23 @@ std::vector<std::string> NotToTheLetter(const std::string& name, const JsonValue
   UsePaperConfig(name, &letter);
   ApplyStyleRecipe("paper", &letter.network);
   UseProtocol("liprf", &letter.consistency);
-  JsonValue all = DecidedValues(letter);
-  const JsonValue style = StyleValues(letter);
-  for (const auto& [option, published] : style.AsObject()) all[option] = published;
-  for (const auto& [option, published] : all.AsObject()) {
-    const JsonValue* const value = values.Find(option);
-    if (value != nullptr && !(*value == published))
-      differences.push_back(option + " is " + Text(*value) + ", published " + Text(published));
-  }
+  for (const JsonValue& part :
+       {DecidedValues(letter), RecipeValues(letter), ProtocolValues(letter)})
+    for (const auto& [option, published] : part.AsObject()) {
+      const JsonValue* const value = values.Find(option);
+      if (value != nullptr && !(*value == published))
+        differences.push_back(option + " is " + Text(*value) + ", published " +
+                              Text(published));
+    }
+  return differences;
+}
+
+std::optional<std::vector<std::string>> SayIfPaper(const RunSettings& settings,
+                                                   const JsonValue& values, Console* console) {
+  if (settings.run.preset != "paper") return std::nullopt;
+  std::vector<std::string> differences = NotToTheLetter(kPaperBase, values);
+  for (const std::string& difference : differences)
+    console->Info("not to the letter: " + difference);
   return differences;
 }
 

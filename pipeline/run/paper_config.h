@@ -1,9 +1,11 @@
 // The four configurations of Plenoxels' published code (svox2), for --preset paper.
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
+#include "pipeline/program/console.h"
 #include "pipeline/program/run_options.h"
 #include "pipeline/run/run_settings.h"
 
@@ -22,7 +24,8 @@ JsonValue DecidedValues(const RunSettings& settings);
 JsonValue PaperValues(const std::string& name);
 
 // {"name": value} of what LipRF's recipe and its protocol decide, the same for all of them.
-JsonValue StyleValues(const RunSettings& settings);
+JsonValue RecipeValues(const RunSettings& settings);
+JsonValue ProtocolValues(const RunSettings& settings);
 
 // What the choice depends on; see paper_traits.h.
 struct PaperTraits {
@@ -44,8 +47,13 @@ void CheckPaper(const std::string& preset, const std::string& config);
 // it, or where its value is not the base's: it was asked for.
 void ApplyPaperChoice(const PaperChoice& choice, OptionSet* options);
 
-// "fit-rays is 64, published 5000" for each of `values` that is neither the configuration's
-// nor, of StyleValues, the recipe's and the protocol's.
+// "fit-rays is 64, published 5000" for each of `values` that is not the configuration's, the
+// recipe's or the protocol's.
 std::vector<std::string> NotToTheLetter(const std::string& name, const JsonValue& values);
+
+// Of the recipe's or the protocol's values, where the preset is that of the paper; said on the
+// console, too. Empty with another preset.
+std::optional<std::vector<std::string>> SayIfPaper(const RunSettings& settings,
+                                                   const JsonValue& values, Console* console);
 
 }  // namespace regrade

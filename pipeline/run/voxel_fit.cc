@@ -132,7 +132,7 @@ std::vector<MeasuredOption> MeasuredOfVoxels(const RunSettings& settings) {
       {"fit", "fit-view-bound", fit.view_bound, {0.1, 0.2, 0.4, 1e6}, false},
       // 4: sums do not depend on the number of threads.
       {"fit", "fit-shards", fit.shards, {0, 4}},
-      // Ray marching, which has no options in a run: films use the field's step and 1e-4.
+      // Ray marching, which has no options in a run: exact frames use the field's own.
       {"render", "ray-stop", nullptr, {1e-2, 1e-3, 0.0}},
       {"render", "ray-step", nullptr, {2.0, 0.5}},
   };

@@ -24,6 +24,7 @@
 #include "pipeline/images/kept_pictures.h"
 #include "pipeline/program/device_choice.h"
 #include "pipeline/report/records.h"
+#include "pipeline/run/paper_config.h"
 #include "pipeline/run/run_context.h"
 #include "pipeline/stages/carried_edit.h"
 #include "pipeline/stages/control_ceiling.h"
@@ -340,6 +341,7 @@ StageOutcome Evaluate(RunContext* context, const ProgressFunction& progress) {
   report.warp = settings.consistency.warp;
   report.error_per = settings.consistency.error_per;
   report.protocol = ProtocolOf(settings.consistency);
+  report.not_to_the_letter = SayIfPaper(settings, ProtocolValues(settings), context->console);
   if (!same_camera) report.comparison_note = ComparisonNote(compared[0]);
   if (edited) report.edit_seen = MeanOfPictures(frames(kEditedFrames, training_views));
   report.psnr_to_2d_photos_db = Metric(to_photos.psnr_to_2d_db);

@@ -196,12 +196,12 @@ StageOutcome Stylize(RunContext* context, const JsonValue& inputs,
   } else {
     std::filesystem::remove(workspace.Path("object.npz"));  // of an earlier style
   }
-  if (request.options.loss_scale == "sum-over-voxels") {
+  if (request.options.loss_scale == "sum-over-voxels" && trained.loss_balance) {
     metrics.loss_balance = trained.loss_balance;
     context->console->Info(Format(
         "3 Q / B, rays times channels of a step over what the network maps, is %.3g: where it "
         "is above 1 the regularisation hardly counts",
-        trained.loss_balance));
+        *trained.loss_balance));
   }
   metrics.device = DeviceName(request.backend);
   metrics.notices = restyled.notices;
@@ -210,11 +210,7 @@ StageOutcome Stylize(RunContext* context, const JsonValue& inputs,
     context->console->Detail(why);
     metrics.notices.push_back(why);
   }
-  if (settings.run.preset == "paper") {
-    metrics.not_to_the_letter = NotToTheLetter(kPaperBase, StyleValues(settings));
-    for (const std::string& difference : *metrics.not_to_the_letter)
-      context->console->Info("not to the letter: " + difference);
-  }
+  metrics.not_to_the_letter = SayIfPaper(settings, RecipeValues(settings), context->console);
   PutMetrics(metrics, &outcome.metrics);
   return outcome;
 }

@@ -108,10 +108,7 @@ class Fitter {
     if (hooks_.keep_field) {
       engine_->ReadState(
           [this](FitState* state) { result_.field = ToRadianceField(state->grid); });
-      // No ray of the fit ended later than those that look at its field.
-      result_.field.march.step = options_.step;
-      result_.field.march.stop_transmittance =
-          std::min(result_.field.march.stop_transmittance, options_.stop_transmittance);
+      result_.field.march = MarchOfField(options_);
     }
     result_.psnr_train_db = PsnrOf(tally_.tail_error, tally_.tail_rays);
     result_.rays = tally_.rays;

@@ -1,11 +1,13 @@
 // Options of fitting a radiance field.
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <string>
 #include <vector>
 
 #include "kernels/base/options.h"
+#include "kernels/field/march_options.h"
 
 namespace regrade {
 
@@ -301,5 +303,11 @@ struct FitOptions {
           .constant = true});
   }
 };
+
+// How the field of a fit is looked at: no ray of the fit ends later.
+inline MarchOptions MarchOfField(const FitOptions& options) {
+  return {options.step,
+          std::min(MarchOptions().stop_transmittance, options.stop_transmittance)};
+}
 
 }  // namespace regrade

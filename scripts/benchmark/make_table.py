@@ -53,7 +53,7 @@ def rows_of(scene, style, method, seed, report):
             continue
         near = next((f for f in report.get("fidelity", []) if f["sequence"] == sequence), {})
         row = {"scene": scene, "style": style, "method": names.get(sequence, method), "seed": seed,
-               "motion": evaluate.get("mask"), "flow": evaluate.get("flow"),
+               "motion": evaluate.get("mask"), "flow": "exact" if evaluate.get("mask") == "geometry" else evaluate.get("flow"),
                "short_db": tc.get((sequence, gaps[0])), "long_db": tc.get((sequence, gaps[-1])),
                "structure": near.get("structure"), "distance_to_style": near.get("sliced_wasserstein_to_style")}
         if sequence == "source":
@@ -146,7 +146,7 @@ def as_printed(rows):
 def latex(head, lines, words=4):
     cell = lambda value: value.replace("_", r"\_").replace("±", r"$\pm$")
     body = [" & ".join(cell(value) for value in cells) + r" \\" for cells in lines]
-    return "\n".join([r"\begin{tabular}{" + "l" * words + "r" * (len(head) - words) + "}", r"\toprule", " & ".join(head) + r" \\", r"\midrule"] +
+    return "\n".join([r"\begin{tabular}{" + "l" * words + "r" * (len(head) - words) + "}", r"\toprule", " & ".join(cell(value) for value in head) + r" \\", r"\midrule"] +
                      body + [r"\bottomrule", r"\end{tabular}", ""])
 
 

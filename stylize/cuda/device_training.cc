@@ -20,7 +20,7 @@ std::vector<std::pair<int, int>> LayerShapes(const LipschitzNetwork& network) {
   return shapes;
 }
 
-// What a summed loss is divided by, of voxels; 0: three times the rays that count.
+// What a summed loss is divided by; 0: three times the rays that count.
 double LossDivisor(const DeviceStyleField& field, const AggregationOptions& options) {
   return options.divide_by_voxels ? static_cast<double>(NumMapped(field)) : 0;
 }

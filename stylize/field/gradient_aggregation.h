@@ -6,8 +6,8 @@
 //   f(voxel), d_i the ray's direction; of splats s_i = f(splat), and d_i as in EQ(splat-color).
 // Geometry is frozen, so w_i and T_r are constants. LipRF's Algorithm 1 sends every voxel
 // through f; a voxel that no ray touches has gradient zero, so sending the touched ones alone
-// gives the same gradient. The paper's text also allows 1 / B in place of 1 / (3 Q), B the
-// number of what f maps: voxels and texels of the background.
+// gives the same gradient. The paper's text also allows 1 / B in place of 1 / (3 Q), B being
+// the number of points that f maps: voxels and texels of the background.
 //
 // With view_weight > 0 the loss has a second term, see EQ(view-penalty), and so has the
 // gradient.

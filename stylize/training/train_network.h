@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <functional>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -71,9 +72,10 @@ struct TrainNetworkResult {
   double psnr_db = 0;              // of a fixed sample of training rays to the targets, clipped
   double linear_map_psnr_db = 0;   // the same of linear_map; 0 without a base map
   double mean_touched_voxels = 0;
-  // 3 Q / B of a step, rays and channels over what the network maps: the weight that LipRF's sum
-  // over voxels gives the colours against the regularisation, beside a mean over rays.
-  double loss_balance = 0;
+  // 3 Q / B of a step, rays and channels over what the network maps: the weight that LipRF's
+  // sum over voxels gives the colours against the regularisation, beside a mean over rays.
+  // Empty if this call made no step.
+  std::optional<double> loss_balance;
   ColorMap linear_map;          // the one closer to the targets, however large its norm
   int64_t rejected_steps = 0;   // not finite
   int64_t left_out_pixels = 0;  // targets that are not finite

@@ -35,10 +35,12 @@ struct TrainNetworkOptions : WeightUpdateOptions {
           .choices = "standard|paper"});
     WeightUpdateOptions::Describe(bind);
     loss.Describe(bind);
-    bind("style-loss", loss_scale,
-         {.help = "mean over rays and channels, or the paper's sum divided by the voxels",
-          .choices = "mean|sum-over-voxels",
-          .constant = true});
+    bind(
+        "style-loss", loss_scale,
+        {.help =
+             "mean over rays and channels, or the paper's sum divided by what the network maps",
+         .choices = "mean|sum-over-voxels",
+         .constant = true});
     bind("style-rays", rays_per_step,
          {.unit = "rays",
           .help = "rays of a training step, in square patches; 0 takes a whole view",

@@ -44,6 +44,7 @@ StoredField SmallField(int basis) {
   stored.field.geometry = geometry;
   stored.field.background = {0.25f, 0.5f, 1};
   stored.field.near_clip = 0.125f;
+  stored.field.march = {0.75f, 1e-7f};
   stored.field_from_world.scale = 3;
   stored.field_from_world.translation = {1, 2, 3};
   Mat3d& turn = stored.field_from_world.rotation;
@@ -68,6 +69,8 @@ TEST(FieldFile, RoundTripIsExactUpToHalfColours) {
                 FloatFromHalf(HalfFromFloat(out.field.appearance.sh[i])));
     EXPECT_EQ(in.field.background, out.field.background);
     EXPECT_EQ(in.field.near_clip, out.field.near_clip);
+    EXPECT_EQ(in.field.march.step, out.field.march.step);
+    EXPECT_EQ(in.field.march.stop_transmittance, out.field.march.stop_transmittance);
     EXPECT_EQ(in.field_from_world.scale, 3);
     EXPECT_EQ(in.field_from_world.rotation(0, 1), 0.6);
     EXPECT_EQ(in.field_from_world.translation.z, 3);

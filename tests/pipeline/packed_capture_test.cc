@@ -41,10 +41,12 @@ PackedCapture SmallCapture() {
 
 TEST(PackedCapture, ReadsBackAsWritten) {
   const testing::TemporaryFolder folder;
-  const PackedCapture capture = SmallCapture();
+  PackedCapture capture = SmallCapture();
+  capture.decided = R"({"scene-margin": 0.25})";
   WritePackedCapture(folder / "a.npz", capture);
   const PackedCapture back = ReadPackedCapture(folder / "a.npz");
   ASSERT_EQ(back.views.size(), 3u);
+  EXPECT_EQ(back.decided, capture.decided);
   EXPECT_EQ(back.scene.field_from_world.scale, 0.25);
   EXPECT_EQ(back.scene.field_from_world.translation,
             capture.scene.field_from_world.translation);

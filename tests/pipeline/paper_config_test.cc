@@ -229,13 +229,17 @@ TEST(PaperConfig, TheChoiceKeepsWhatWasSetByHand) {
 TEST(PaperConfig, TheStyleAndTheProtocolAreOfTheLetter) {
   const auto named = [](const std::vector<std::string>& arguments) {
     std::vector<std::string> options;
-    for (const std::string& difference : NotToTheLetter(kPaperBase, StyleValues(Of(arguments))))
-      options.push_back(difference.substr(0, difference.find(' ')));
+    const RunSettings settings = Of(arguments);
+    for (const JsonValue& values : {RecipeValues(settings), ProtocolValues(settings)})
+      for (const std::string& difference : NotToTheLetter(kPaperBase, values))
+        options.push_back(difference.substr(0, difference.find(' ')));
     return options;
   };
   EXPECT_TRUE(named({"--preset", "paper"}).empty());
   EXPECT_EQ(named({"--preset", "paper", "--style-steps", "6", "--mode", "lai2018"}),
-            (std::vector<std::string>{"mode", "style-steps"}));
+            (std::vector<std::string>{"style-steps", "mode"}));
+  EXPECT_TRUE(
+      named({"--preset", "paper", "--config", R"({"style-exact-sums": true})"}).empty());
   const std::vector<std::string> other = named({"--preset", "paper", "--recipe", "standard"});
   for (const char* option : {"recipe", "style-loss", "style-rays", "style-base", "style-rate"})
     EXPECT_TRUE(std::ranges::count(other, option)) << option;

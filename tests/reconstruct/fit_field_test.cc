@@ -199,6 +199,17 @@ TEST(DelayFactor, RisesFromAHundredthToOne) {
   EXPECT_EQ(DelayFactor(0, 0), 1);
 }
 
+// Frames and styles march on where the fit stopped early, and no less far than it did.
+TEST(MarchOfField, NoRayOfTheFitEndsLater) {
+  FitOptions fit;
+  fit.step = 0.75f;
+  fit.stop_transmittance = 1e-3f;
+  EXPECT_EQ(MarchOfField(fit).step, 0.75f);
+  EXPECT_EQ(MarchOfField(fit).stop_transmittance, 1e-4f);
+  fit.stop_transmittance = 1e-7f;
+  EXPECT_EQ(MarchOfField(fit).stop_transmittance, 1e-7f);
+}
+
 TEST_F(FitField, H85_PruningEverythingIsAnError) {
   options_.prune_weight = 100;
   try {

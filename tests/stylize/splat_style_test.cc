@@ -170,7 +170,18 @@ TEST(SplatStyle, AnObjectsSplatsAloneAreRestyled) {
   request.options.steps = 20;
   request.options.rays_per_step = 256;
   request.object_weights = &half;
-  const RestyledField restyled = Restyle(ball.field, targets, request, {});
+  int checks = 0;
+  RestyleHooks hooks;
+  hooks.check = [&](const RestyledField& result, RayWeigher* weigher) {
+    ++checks;
+    const StyleRays rays = SomeRays(1, 8);
+    const RayWeights weights = weigher->Weigh(rays),
+                     exact = ExactWeigher(result.source)->Weigh(rays);
+    EXPECT_EQ(weights.first, exact.first);  // none is dropped, as in the training
+    EXPECT_EQ(weights.transmittance, exact.transmittance);
+  };
+  const RestyledField restyled = Restyle(ball.field, targets, request, hooks);
+  EXPECT_EQ(checks, 1);
   EXPECT_TRUE(restyled.notices.empty());
   EXPECT_EQ(restyled.styled.geometry, ball.field.geometry);
   int64_t changed[2] = {};

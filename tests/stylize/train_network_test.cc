@@ -226,6 +226,7 @@ TEST(TrainNetwork, Ablations) {
   EXPECT_LE(start.bound, limited.bound_factor * map.k_est * (1 + 1e-9));
   for (int l = 1; l < kNetworkLayers; ++l)
     EXPECT_NEAR(start.network.k(l), start.network.k(0), 1e-4);
+  EXPECT_LT(start.network.k(0), 0.99);
   TrainNetworkOptions free = options, tight = options;
   options.lambda = free.lambda = tight.lambda = 0.05;
   free.no_regularisation = true;
