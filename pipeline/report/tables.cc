@@ -54,7 +54,9 @@ std::string HeadlineMetricsHtml(const RunReport& report) {
   const auto card = [&](const std::string& name, const std::string& value) {
     html += "<div><dt>" + name + "</dt><dd>" + value + "</dd></div>";
   };
-  if (const auto& s = report.stages.reconstruct) {
+  // A scene without photos has neither of the two.
+  if (const auto& s = report.stages.reconstruct;
+      s && (s->psnr_train_db.value || s->psnr_heldout_db.value)) {
     std::string value = MetricHtml(s->psnr_heldout_db, 2, "<small>dB</small>");
     if (s->ssim_heldout.value)
       value += " <small>SSIM " + MetricHtml(s->ssim_heldout, 3) + "</small>";

@@ -89,10 +89,9 @@ ReportPictures PicturesOf(const RunContext& context, const RunReport& report) {
     const int i = shown < 2 ? 0 : k * (count - 1) / (shown - 1);
     const CaptureView& photo = capture.views[i];
     const std::string name = FrameName(i);
-    const Image picture = as_taken.Photo(i);
     ReportView view;
     view.name = name.substr(0, 5) + ", " + photo.file;
-    view.photo = Encoded(picture);
+    if (!capture.rendered) view.photo = Encoded(as_taken.Photo(i));
     view.source = PictureAt(workspace.Path("frames/source/" + name));
     view.views_2d = PictureAt(workspace.Path("frames/views_2d/" + name));
     view.styled = PictureAt(workspace.Path("frames/styled/" + name));

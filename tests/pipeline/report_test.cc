@@ -109,6 +109,15 @@ TEST(HtmlText, NumbersAndDurations) {
   EXPECT_EQ(GroupedNumber(-1234567), "-1,234,567");
 }
 
+TEST(ReportHtml, AScenesQualityIsShownWhereThereArePhotos) {
+  RunReport report = SomeReport();
+  EXPECT_NE(ReportHtml(report, SomePictures()).find("reconstruction quality"),
+            std::string::npos);
+  report.stages.reconstruct->psnr_train_db = Metric::Undefined("there are no photos");
+  EXPECT_EQ(ReportHtml(report, SomePictures()).find("reconstruction quality"),
+            std::string::npos);
+}
+
 TEST(ReportHtml, HostileNamesStayText) {
   const std::string evil = "\"><script>alert('x')</script><img src=x onerror=alert(1)>.jpg";
   RunReport report = SomeReport();
