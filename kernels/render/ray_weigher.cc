@@ -13,8 +13,8 @@ std::unique_ptr<RayWeigher> MakeRayWeigher(const Geometry& geometry, float near_
 }
 
 std::vector<double> RayDepths(const RadianceField& field, const ViewRays& rays,
-                              const MarchOptions& march, RayWeigher* weigher) {
-  return RenderKindOf(*field.geometry).ray_depths(field, rays, march, weigher);
+                              RayWeigher* weigher) {
+  return RenderKindOf(*field.geometry).ray_depths(field, rays, weigher);
 }
 
 }  // namespace regrade

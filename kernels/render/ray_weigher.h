@@ -40,6 +40,6 @@ std::unique_ptr<RayWeigher> MakeRayWeigher(const Geometry& geometry, float near_
 // [rays]: depth along the camera's optical axis of what each ray meets (of splats the median),
 // 0 where that is less than half of its light. `weigher`: of the field, with min_weight 0.
 std::vector<double> RayDepths(const RadianceField& field, const ViewRays& rays,
-                              const MarchOptions& march, RayWeigher* weigher);
+                              RayWeigher* weigher);
 
 }  // namespace regrade

@@ -17,7 +17,7 @@ struct RenderKind {
   std::unique_ptr<RayWeigher> (*make_weigher)(const Geometry& geometry, float near_clip,
                                               const MarchOptions& march, int64_t kept_bytes);
   std::vector<double> (*ray_depths)(const RadianceField& field, const ViewRays& rays,
-                                    const MarchOptions& march, RayWeigher* weigher);
+                                    RayWeigher* weigher);
   std::vector<double> (*optical_depths)(const RadianceField& field,
                                         const std::vector<Vec3d>& path);
 };

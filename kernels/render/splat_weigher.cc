@@ -204,7 +204,7 @@ std::unique_ptr<RayWeigher> MakeSplatWeigher(const Geometry& geometry, float nea
 }
 
 std::vector<double> SplatDepths(const RadianceField& field, const ViewRays& rays,
-                                const MarchOptions&, RayWeigher* weigher) {
+                                RayWeigher* weigher) {
   const RayWeights weights = weigher->Weigh(rays);
   std::vector<double> depths(rays.rays.size());
   for (int64_t r = 0; r < rays.size(); ++r)

@@ -52,6 +52,6 @@ class SplatWeigher : public RayWeigher {
 std::unique_ptr<RayWeigher> MakeSplatWeigher(const Geometry& geometry, float near_clip,
                                              const MarchOptions& march, int64_t kept_bytes);
 std::vector<double> SplatDepths(const RadianceField& field, const ViewRays& rays,
-                                const MarchOptions& march, RayWeigher* weigher);
+                                RayWeigher* weigher);
 
 }  // namespace regrade

@@ -38,14 +38,13 @@ std::unique_ptr<RayWeigher> MakeVoxelWeigher(const Geometry& geometry, float nea
   return std::make_unique<VoxelWeigher>(geometry, near_clip, march);
 }
 
-std::vector<double> VoxelDepths(const RadianceField& field, const ViewRays& rays,
-                                const MarchOptions& march, RayWeigher*) {
+std::vector<double> VoxelDepths(const RadianceField& field, const ViewRays& rays, RayWeigher*) {
   std::vector<double> depths(rays.rays.size());
   const FieldView<float> view = ViewOf(field);
 #pragma omp parallel for schedule(dynamic, 16)
   for (int64_t r = 0; r < rays.size(); ++r)
     depths[static_cast<size_t>(r)] =
-        VoxelDepth(view, rays.CameraOf(r), rays.rays[static_cast<size_t>(r)], march);
+        VoxelDepth(view, rays.CameraOf(r), rays.rays[static_cast<size_t>(r)], field.march);
   return depths;
 }
 

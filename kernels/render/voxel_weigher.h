@@ -13,6 +13,6 @@ namespace regrade {
 std::unique_ptr<RayWeigher> MakeVoxelWeigher(const Geometry& geometry, float near_clip,
                                              const MarchOptions& march, int64_t kept_bytes);
 std::vector<double> VoxelDepths(const RadianceField& field, const ViewRays& rays,
-                                const MarchOptions& march, RayWeigher* weigher);
+                                RayWeigher* weigher);
 
 }  // namespace regrade

@@ -21,8 +21,7 @@ std::vector<Value> Quantized(const Image& image) {
   return values;
 }
 
-// `tagged`: the file says that
-// its colours are sRGB. Both throw Error(kResources).
+// `tagged`: the file says that its colours are sRGB. Both throw Error(kResources).
 
 // 1, 3 or 4 channels (straight alpha), `bits` 8 or 16, zlib's `level` 0 to 9.
 std::string EncodePng(const Image& image, int bits, int level, bool tagged);

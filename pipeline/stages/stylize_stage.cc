@@ -56,14 +56,13 @@ void SetVariance(const RestyledField& restyled, const std::vector<StyledTraining
   std::vector<Camera> cameras;
   for (const StyledTrainingView& view : views) cameras.push_back(view.camera);
   const RadianceField& source = restyled.source;
-  const MarchOptions march = source.march;
   const auto measure = [&](const RayPairs& pairs) {
     return MetricsOfVariance(MeasureVariance(source, restyled.styled, restyled.trained.network,
                                              pairs, weigher, object_weights));
   };
   metrics->variance = measure(NeighbouringPixels(cameras, kVariancePairs, seed));
   metrics->variance_across_views =
-      measure(PixelsOfOnePoint(source, cameras, kVariancePairs, seed, march, weigher));
+      measure(PixelsOfOnePoint(source, cameras, kVariancePairs, seed, weigher));
 }
 
 // Why the local Lipschitz constant is above what the colours' covariances predict, where it is.

@@ -61,8 +61,7 @@ RayPairs NeighbouringPixels(const std::vector<Camera>& cameras, int64_t count, u
 }
 
 RayPairs PixelsOfOnePoint(const RadianceField& field, const std::vector<Camera>& cameras,
-                          int64_t count, uint64_t seed, const MarchOptions& march,
-                          RayWeigher* weigher) {
+                          int64_t count, uint64_t seed, RayWeigher* weigher) {
   RayPairs pairs{.cameras = cameras};
   if (cameras.size() < 2) return pairs;
   for (int round = 0; round < kTries && pairs.size() < 2 * count; ++round) {
@@ -74,7 +73,7 @@ RayPairs PixelsOfOnePoint(const RadianceField& field, const std::vector<Camera>&
       const int x = draw(1, camera.width), y = draw(2, camera.height);
       from.AddPixel(index, x, y);
     }
-    const std::vector<double> depths = RayDepths(field, from, march, weigher);
+    const std::vector<double> depths = RayDepths(field, from, weigher);
     std::vector<size_t> source;
     std::vector<double> expected;
     for (size_t i = 0; i < depths.size(); ++i) {
@@ -85,7 +84,7 @@ RayPairs PixelsOfOnePoint(const RadianceField& field, const std::vector<Camera>&
       source.push_back(i);
       expected.push_back(depth);
     }
-    const std::vector<double> seen = RayDepths(field, to, march, weigher);
+    const std::vector<double> seen = RayDepths(field, to, weigher);
     for (size_t k = 0; k < seen.size() && pairs.size() < 2 * count; ++k) {
       if (!(std::abs(seen[k] / expected[k] - 1) <= kDepthTolerance)) continue;
       const ViewPlace &one = from.places[source[k]], &other = to.places[k];

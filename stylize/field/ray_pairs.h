@@ -7,7 +7,6 @@
 #include <vector>
 
 #include "kernels/field/radiance_field.h"
-#include "kernels/field/ray_march.h"
 #include "kernels/render/ray_weigher.h"
 #include "kernels/scene/view_rays.h"
 
@@ -26,7 +25,6 @@ RayPairs NeighbouringPixels(const std::vector<Camera>& cameras, int64_t count, u
 // meet have no depth. Fewer than two cameras have no pairs. The same for any number of threads.
 // `weigher`: of the field, with min_weight 0.
 RayPairs PixelsOfOnePoint(const RadianceField& field, const std::vector<Camera>& cameras,
-                          int64_t count, uint64_t seed, const MarchOptions& march,
-                          RayWeigher* weigher);
+                          int64_t count, uint64_t seed, RayWeigher* weigher);
 
 }  // namespace regrade

@@ -28,15 +28,14 @@ RestyledField Restyle(RadianceField field, const TrainingTargets& targets,
   if (request.options.map_background && request.object_weights == nullptr)
     field.background = MapBackground(scene_map.map, field.background);
 
-  const MarchOptions march = field.march;
   const std::unique_ptr<StyleEngine> engine =
-      MakeStyleEngine(request.backend, &field, march, request.options);
+      MakeStyleEngine(request.backend, &field, request.options);
   finished(Part::kUpload);
   ProgressParts parts(hooks.training.progress, 1 + kAfterTraining);
   TrainingHooks training = hooks.training;
   training.progress = parts.Next(1);
-  result.trained = TrainNetwork(field, targets.views(), scene_map, march, request.options,
-                                training, request.resume, engine.get());
+  result.trained = TrainNetwork(field, targets.views(), scene_map, request.options, training,
+                                request.resume, engine.get());
   finished(Part::kTraining);
   Appearance restyled = engine->Restyle(result.trained.network, parts.Next(kAfterTraining));
   result.styled = {field.geometry, std::move(restyled), field.background, field.near_clip,

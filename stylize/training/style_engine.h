@@ -67,7 +67,6 @@ std::unique_ptr<StyleEngine> MakeCudaStyleEngine(const RadianceField* field,
                                                  int64_t rays_per_step);
 
 std::unique_ptr<StyleEngine> MakeStyleEngine(Backend backend, const RadianceField* field,
-                                             const MarchOptions& march,
                                              const TrainNetworkOptions& options);
 
 }  // namespace regrade

@@ -59,9 +59,8 @@ std::unique_ptr<StyleEngine> MakeCpuStyleEngine(const RadianceField* field,
 }
 
 std::unique_ptr<StyleEngine> MakeStyleEngine(Backend backend, const RadianceField* field,
-                                             const MarchOptions& march,
                                              const TrainNetworkOptions& options) {
-  const AggregationOptions loss = LossOptions(options, march);
+  const AggregationOptions loss = LossOptions(options, field->march);
   if (backend == Backend::kCpu) return MakeCpuStyleEngine(field, loss);
   return MakeCudaStyleEngine(field, loss, RaysPerStep(options.rays_per_step, options.patch));
 }

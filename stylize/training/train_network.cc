@@ -37,13 +37,13 @@ std::string FirstNonFinite(const LipschitzNetwork& network, const std::vector<do
 class Training {
  public:
   Training(const RadianceField& field, const std::vector<StyledTrainingView>& views,
-           const SceneColorMap& scene_map, const MarchOptions& march,
-           const TrainNetworkOptions& options, StyleEngine* engine)
+           const SceneColorMap& scene_map, const TrainNetworkOptions& options,
+           StyleEngine* engine)
       : field_(field),
         views_(views),
         scene_map_(scene_map),
         options_(options),
-        loss_options_(LossOptions(options, march)),
+        loss_options_(LossOptions(options, field.march)),
         engine_(*engine),
         // A fixed sample of the training pixels chooses the base and measures the gain.
         sample_(SampleStyleRays(views, 16384, 8, options.seed, kSampleStream)),
@@ -252,16 +252,16 @@ TrainNetworkResult Training::Conclude() {
 
 TrainNetworkResult TrainNetwork(const RadianceField& field,
                                 const std::vector<StyledTrainingView>& views,
-                                const SceneColorMap& scene_map, const MarchOptions& march,
+                                const SceneColorMap& scene_map,
                                 const TrainNetworkOptions& options, const TrainingHooks& hooks,
                                 const TrainingState* resume, StyleEngine* engine) {
   const int64_t bad_pixels = ValidateViews(views);
   std::unique_ptr<StyleEngine> on_cpu;
   if (engine == nullptr) {
-    on_cpu = MakeStyleEngine(Backend::kCpu, &field, march, options);
+    on_cpu = MakeStyleEngine(Backend::kCpu, &field, options);
     engine = on_cpu.get();
   }
-  Training training(field, views, scene_map, march, options, engine);
+  Training training(field, views, scene_map, options, engine);
   if (resume != nullptr) {
     training.Resume(*resume);
   } else {

@@ -9,7 +9,6 @@
 
 #include "kernels/base/progress.h"
 #include "kernels/field/radiance_field.h"
-#include "kernels/field/ray_march.h"
 #include "kernels/optimize/adam.h"
 #include "kernels/scene/camera.h"
 #include "kernels/scene/image.h"
@@ -84,12 +83,12 @@ struct TrainNetworkResult {
 };
 
 // `resume`, unless null, is a state that a checkpoint hook received, of the same inputs.
-// `engine`, unless null, was made of the same field, march and options; null trains on the CPU.
+// `engine`, unless null, was made of the same field and options; null trains on the CPU.
 // Throws Error(kInput) for a target of another size or with more than 1 % of pixels that are
 // not finite, Error(kScene) when two steps in a row are not finite, Interrupted.
 TrainNetworkResult TrainNetwork(const RadianceField& field,
                                 const std::vector<StyledTrainingView>& views,
-                                const SceneColorMap& scene_map, const MarchOptions& march,
+                                const SceneColorMap& scene_map,
                                 const TrainNetworkOptions& options, const TrainingHooks& hooks,
                                 const TrainingState* resume = nullptr,
                                 StyleEngine* engine = nullptr);

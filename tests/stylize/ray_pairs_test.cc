@@ -35,8 +35,7 @@ RadianceField HardBall() {
 TEST(RayPairs, BothRaysEndAtOnePoint) {
   const RadianceField ball = HardBall();
   const std::vector<Camera> cameras = Ring(9, 60);  // 40 degrees apart
-  const RayPairs pairs =
-      PixelsOfOnePoint(ball, cameras, 1000, 3, MarchOptions{}, ExactWeigher(ball).get());
+  const RayPairs pairs = PixelsOfOnePoint(ball, cameras, 1000, 3, ExactWeigher(ball).get());
   ASSERT_GT(pairs.size(), 1000);  // of 4000 pixels, two thirds on the ball
   for (size_t i = 0; i < pairs.rays.size(); i += 2) {
     const Vec3d a = EndOf(ball, pairs.rays[i]), b = EndOf(ball, pairs.rays[i + 1]);
@@ -51,8 +50,7 @@ TEST(RayPairs, BothRaysEndAtOnePoint) {
 TEST(RayPairs, APointThatIsHiddenIsNoPair) {
   const std::vector<Camera> opposite{Ring(2, 60)};
   const auto pairs = [](const RadianceField& field, const std::vector<Camera>& cameras) {
-    return PixelsOfOnePoint(field, cameras, 500, 3, MarchOptions{}, ExactWeigher(field).get())
-        .size();
+    return PixelsOfOnePoint(field, cameras, 500, 3, ExactWeigher(field).get()).size();
   };
   EXPECT_EQ(pairs(HardBall(), opposite), 0);
   EXPECT_EQ(pairs(HardBall(), {Ring(1, 60)}), 0);
@@ -66,8 +64,7 @@ TEST(RayPairs, APointThatIsHiddenIsNoPair) {
 TEST(RayPairs, TheSameForAnyNumberOfThreads) {
   const RadianceField ball = Ball(20);
   const auto pairs = [&] {
-    return PixelsOfOnePoint(ball, Ring(9, 60), 200, 5, MarchOptions{},
-                            ExactWeigher(ball).get());
+    return PixelsOfOnePoint(ball, Ring(9, 60), 200, 5, ExactWeigher(ball).get());
   };
   const RayPairs one = [&] {
     const Threads single(1);
@@ -142,8 +139,8 @@ TEST(VolumeVariance, PairsOnSpheresAreAGroupAndDifferAsRendered) {
 TEST(VolumeVariance, PixelsOfOnePointStayBelowTheBound) {
   Surrounded scene;
   scene.Style();
-  const RayPairs pairs = PixelsOfOnePoint(scene.source, scene.cameras, 2000, 3, MarchOptions{},
-                                          ExactWeigher(scene.source).get());
+  const RayPairs pairs =
+      PixelsOfOnePoint(scene.source, scene.cameras, 2000, 3, ExactWeigher(scene.source).get());
   const VarianceReport report = MeasureVariance(scene.source, scene.styled, scene.network,
                                                 pairs, ExactWeigher(scene.source).get());
   EXPECT_GT(report.valid.pairs, 500);

@@ -20,7 +20,7 @@ TEST(SplatsOfDegreeThree, TrainingReproduces) {
   options.rays_per_step = 256;
   const auto train = [&](int threads) {
     const Threads some(threads);
-    return TrainNetwork(ball.field, ball.views, MapOf(ball), {}, options, {}).network;
+    return TrainNetwork(ball.field, ball.views, MapOf(ball), options, {}).network;
   };
   const LipschitzNetwork network = train(1), again = train(5);
   EXPECT_TRUE(RecordSameBits("training of degree 3", Computed::kFloat,
@@ -44,7 +44,7 @@ TEST(SplatsOfDegreeThree, H36_NoPairIsSteeperThanTheBound) {
   options.steps = 60;
   options.rays_per_step = 512;
   const LipschitzNetwork network =
-      TrainNetwork(ball.field, ball.views, MapOf(ball), {}, options, {}).network;
+      TrainNetwork(ball.field, ball.views, MapOf(ball), options, {}).network;
   ASSERT_EQ(network.row().basis, 16);
   const double bound = network.Bound();
   EXPECT_GT(network.ResidualBound(), 0.1 * bound);

@@ -137,7 +137,7 @@ TEST_P(SplatStyleOf, TrainingBeatsTheLinearMap) {
   options.steps = 120;
   options.rays_per_step = 512;
   const TrainNetworkResult result =
-      TrainNetwork(ball.field, ball.views, MapOf(ball), {}, options, {});
+      TrainNetwork(ball.field, ball.views, MapOf(ball), options, {});
   EXPECT_GT(result.psnr_db, result.linear_map_psnr_db + 3);
   EXPECT_LE(result.bound, 4 * result.k_est * (1 + 1e-9));
   EXPECT_LE(result.local_lipschitz_sampled, result.bound);
@@ -342,7 +342,7 @@ TEST_P(SplatStyleOf, PairsStayBelowTheirBound) {
   const std::vector<Camera> cameras = Ring(9, 60);
   const auto weigher = ExactWeigher(source);
   const RayPairs neighbours = NeighbouringPixels(cameras, 2000, 3),
-                 points = PixelsOfOnePoint(source, cameras, 2000, 3, {}, weigher.get());
+                 points = PixelsOfOnePoint(source, cameras, 2000, 3, weigher.get());
   EXPECT_EQ(neighbours.size(), 4000);
   EXPECT_GT(points.size(), 500);
   for (size_t i = 0; i < points.rays.size(); i += 2)
@@ -366,8 +366,7 @@ TEST_P(SplatStyleOf, PairsStayBelowTheirBound) {
   EXPECT_GT(report.largest_fraction, 0.1);
   EXPECT_LE(report.largest_fraction, 1 + 1e-4);
   const Threads single(1);
-  EXPECT_EQ(PixelsOfOnePoint(source, cameras, 2000, 3, {}, weigher.get()).size(),
-            points.size());
+  EXPECT_EQ(PixelsOfOnePoint(source, cameras, 2000, 3, weigher.get()).size(), points.size());
 }
 
 // --- positions

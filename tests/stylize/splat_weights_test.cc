@@ -139,8 +139,7 @@ TEST(SplatWeights, DepthsAreThePictures) {
   const RadianceField field = SplatBall(900);
   const Camera camera = Ring(5, 40)[2];
   const auto weigher = MakeRayWeigher(*field.geometry, field.near_clip, MarchOptions{});
-  const std::vector<double> depths =
-      RayDepths(field, PixelsOf({camera}), MarchOptions{}, weigher.get());
+  const std::vector<double> depths = RayDepths(field, PixelsOf({camera}), weigher.get());
   const Image picture = FieldRenderer(field, Backend::kCpu).Render(camera).depth;
   // Where a splat leaves half of the light to a rounding, the next one may be taken.
   int seen = 0, others = 0;

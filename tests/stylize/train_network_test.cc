@@ -60,7 +60,7 @@ TEST(LeastSquaresMap, RecoversALinearStyle) {
 TEST(TrainNetwork, BeatsTheLinearMapWhereTheStyleIsCurved) {
   const StyledBall ball(20, 6, 40, CurvedStyle);
   const TrainNetworkResult result =
-      TrainNetwork(ball.field, ball.views, MapOf(ball), {}, Quick(120), {});
+      TrainNetwork(ball.field, ball.views, MapOf(ball), Quick(120), {});
   EXPECT_GT(result.psnr_db, result.linear_map_psnr_db + 3);
   EXPECT_LE(result.bound, 4 * result.k_est * (1 + 1e-9));
   EXPECT_LE(
@@ -85,8 +85,7 @@ TEST(TrainNetwork, ViewWeightKeepsPointsFromFollowingEachView) {
   for (int i = 0; i < 3; ++i) {
     TrainNetworkOptions options = Quick(120);
     options.loss.view_weight = i == 0 ? 0 : i == 1 ? 0.3 : 10;
-    const TrainNetworkResult result =
-        TrainNetwork(ball.field, ball.views, map, {}, options, {});
+    const TrainNetworkResult result = TrainNetwork(ball.field, ball.views, map, options, {});
     const Appearance styled = ApplyNetwork(result.network, ball.field);
     const Appearance mapped =
         ApplyNetwork(NetworkOfMap(result.network.data().base), ball.field);
@@ -104,7 +103,7 @@ TEST(TrainNetwork, ViewWeightKeepsPointsFromFollowingEachView) {
 TEST(TrainNetwork, NeverLosesToTheLinearMap) {
   const StyledBall ball(16, 4, 32, LinearStyle);
   const TrainNetworkResult result =
-      TrainNetwork(ball.field, ball.views, MapOf(ball), {}, Quick(30), {});
+      TrainNetwork(ball.field, ball.views, MapOf(ball), Quick(30), {});
   EXPECT_GE(result.psnr_db, result.linear_map_psnr_db);
 }
 
@@ -114,7 +113,7 @@ TEST(TrainNetwork, AMapSteeperThanTheScenesIsABaselineButNoStart) {
   SceneColorMap flat = steep;
   for (Vec3d& row : flat.map.matrix.row) row = 0.7 * row;
   TrainNetworkOptions options = Quick(120);
-  const TrainNetworkResult result = TrainNetwork(ball.field, ball.views, flat, {}, options, {});
+  const TrainNetworkResult result = TrainNetwork(ball.field, ball.views, flat, options, {});
   EXPECT_GT(SpectralNorm(result.linear_map.matrix), SpectralNorm(flat.map.matrix));
   EXPECT_EQ(result.network.BaseNorm(), SpectralNorm(flat.map.matrix));
   EXPECT_GT(result.psnr_db, result.linear_map_psnr_db);  // that of the steep one
@@ -124,8 +123,7 @@ TEST(TrainNetwork, AMapSteeperThanTheScenesIsABaselineButNoStart) {
   // Less steep than the scene's own it is the start.
   SceneColorMap steeper = steep;
   for (Vec3d& row : steeper.map.matrix.row) row = 1.2 * row;
-  const TrainNetworkResult gentle =
-      TrainNetwork(ball.field, ball.views, steeper, {}, Quick(1), {});
+  const TrainNetworkResult gentle = TrainNetwork(ball.field, ball.views, steeper, Quick(1), {});
   EXPECT_EQ(gentle.network.BaseNorm(), SpectralNorm(gentle.linear_map.matrix));
   EXPECT_LT(gentle.network.BaseNorm(), SpectralNorm(steeper.map.matrix));
 }
@@ -134,13 +132,12 @@ TEST(TrainNetwork, OneThatLearnedLittleGivesWayToTheBetterMapWithinTheBound) {
   const StyledBall ball(16, 4, 32, LinearStyle);
   SceneColorMap flat = MapOf(ball);
   for (Vec3d& row : flat.map.matrix.row) row = 0.7 * row;
-  const TrainNetworkResult result =
-      TrainNetwork(ball.field, ball.views, flat, {}, Quick(1), {});
+  const TrainNetworkResult result = TrainNetwork(ball.field, ball.views, flat, Quick(1), {});
   EXPECT_EQ(result.network.BaseNorm(), SpectralNorm(result.linear_map.matrix));
   EXPECT_EQ(result.psnr_db, result.linear_map_psnr_db);
   TrainNetworkOptions narrow = Quick(1);
   narrow.bound_factor = 0.9;
-  const TrainNetworkResult kept = TrainNetwork(ball.field, ball.views, flat, {}, narrow, {});
+  const TrainNetworkResult kept = TrainNetwork(ball.field, ball.views, flat, narrow, {});
   EXPECT_EQ(kept.network.BaseNorm(), SpectralNorm(flat.map.matrix));
   EXPECT_LE(kept.bound, 0.9 * flat.k_est * (1 + 1e-9));
   EXPECT_LT(kept.psnr_db, result.psnr_db - 1);
@@ -151,7 +148,7 @@ TEST(TrainNetwork, BoundIsKeptHoweverSmall) {
   TrainNetworkOptions options = Quick(40);
   options.bound_factor = 1.3;
   const SceneColorMap map = MapOf(ball);
-  const TrainNetworkResult result = TrainNetwork(ball.field, ball.views, map, {}, options, {});
+  const TrainNetworkResult result = TrainNetwork(ball.field, ball.views, map, options, {});
   EXPECT_LE(result.bound, 1.3 * map.k_est * (1 + 1e-9));
   EXPECT_GT(result.bound, result.network.BaseNorm());
 }
@@ -162,7 +159,7 @@ TEST(TrainNetwork, PaperRecipe) {
   const StyledBall ball(12, 3, 24, CurvedStyle);
   options.steps = 60;
   const TrainNetworkResult result =
-      TrainNetwork(ball.field, ball.views, MapOf(ball), {}, options, {});
+      TrainNetwork(ball.field, ball.views, MapOf(ball), options, {});
   EXPECT_FALSE(result.network.data().has_base);
   EXPECT_EQ(result.linear_map_psnr_db, 0);
   EXPECT_GT(result.psnr_db, 15);
@@ -176,7 +173,7 @@ TEST(TrainNetwork, HiddenBiasesStayZeroWhereThereAreNone) {
   options.steps = 10;
   options.hidden_bias = false;
   const TrainNetworkResult result =
-      TrainNetwork(ball.field, ball.views, MapOf(ball), {}, options, {});
+      TrainNetwork(ball.field, ball.views, MapOf(ball), options, {});
   for (int l = 0; l < kNetworkLayers; ++l) {
     float largest = 0;
     for (int o = 0; o < result.network.Outputs(l); ++o)
@@ -194,7 +191,7 @@ TEST(TrainNetwork, NormsThatDoNotSettleLag) {
   options.steps = 10;
   const auto trained = [&](bool settle) {
     options.settle_norms = settle;
-    return TrainNetwork(ball.field, ball.views, MapOf(ball), {}, options, {});
+    return TrainNetwork(ball.field, ball.views, MapOf(ball), options, {});
   };
   const TrainNetworkResult lags = trained(false), settled = trained(true);
   EXPECT_LT(settled.network.NormDrift(), 1e-4);
@@ -211,7 +208,7 @@ TEST(TrainNetwork, Ablations) {
   options.steps = 40;
   options.rays_per_step = 512;
   const auto bound = [&](const TrainNetworkOptions& o) {
-    return TrainNetwork(ball.field, ball.views, map, {}, o, {}).bound;
+    return TrainNetwork(ball.field, ball.views, map, o, {}).bound;
   };
   TrainNetworkOptions spectral = options;
   spectral.spectral_normalisation = spectral.settle_norms = true;
@@ -222,7 +219,7 @@ TEST(TrainNetwork, Ablations) {
   limited.steps = 1;
   limited.rate_first = limited.rate_last = 0;
   limited.spectral_normalisation = true;
-  const TrainNetworkResult start = TrainNetwork(ball.field, ball.views, map, {}, limited, {});
+  const TrainNetworkResult start = TrainNetwork(ball.field, ball.views, map, limited, {});
   EXPECT_LE(start.bound, limited.bound_factor * map.k_est * (1 + 1e-9));
   for (int l = 1; l < kNetworkLayers; ++l)
     EXPECT_NEAR(start.network.k(l), start.network.k(0), 1e-4);
@@ -243,14 +240,13 @@ TEST(TrainNetwork, H109_H110_ResumeAndThreadsAreBitwise) {
   TrainingHooks hooks;
   hooks.checkpoint_every = 15;
   hooks.checkpoint = [&](const TrainingState& state) { saved.push_back(state); };
-  const TrainNetworkResult straight =
-      TrainNetwork(ball.field, ball.views, map, {}, options, hooks);
+  const TrainNetworkResult straight = TrainNetwork(ball.field, ball.views, map, options, hooks);
   ASSERT_EQ(saved.size(), 3u);
   for (size_t i = 0; i < 2; ++i) {
     ASSERT_EQ(saved[i].step, 15 * static_cast<int64_t>(i));
     const Threads threads(3);
     const TrainNetworkResult resumed =
-        TrainNetwork(ball.field, ball.views, map, {}, options, {}, &saved[i]);
+        TrainNetwork(ball.field, ball.views, map, options, {}, &saved[i]);
     EXPECT_TRUE(testing::RecordSameBits(
         "resumed and straight", testing::Computed::kFloat,
         straight.network.data().parameters == resumed.network.data().parameters));
@@ -294,14 +290,14 @@ TEST(TrainNetwork, H106_StopsAtTheSecondStepThatIsNotFinite) {
   TrainingHooks hooks;
   hooks.checkpoint_every = 5;
   hooks.checkpoint = [&](const TrainingState& s) { state = s; };
-  TrainNetwork(ball.field, ball.views, map, {}, Quick(5), hooks);
+  TrainNetwork(ball.field, ball.views, map, Quick(5), hooks);
   // A bias so large that the network's output overflows: finite itself, but no gradient is.
   LipschitzNetwork broken(state.network);
   broken.bias(5)[0] = 3e38f;
   state.network = broken.data();
   const TrainingState before = state;
   try {
-    TrainNetwork(ball.field, ball.views, map, {}, Quick(20), hooks, &before);
+    TrainNetwork(ball.field, ball.views, map, Quick(20), hooks, &before);
     FAIL() << "learning went on";
   } catch (const Error& error) {
     EXPECT_EQ(error.code(), ExitCode::kScene);
@@ -322,12 +318,12 @@ TEST(TrainNetwork, H34_AVanishedLayerIsWarnedOf) {
       if (warning.find("norm has vanished") != std::string::npos) return true;
     return false;
   };
-  EXPECT_FALSE(warned(TrainNetwork(ball.field, ball.views, map, {}, Quick(2), hooks)));
+  EXPECT_FALSE(warned(TrainNetwork(ball.field, ball.views, map, Quick(2), hooks)));
   LipschitzNetwork vanished(state.network);
   vanished.k(2) = -1;  // squareplus of it is 2.5e-13
   state.network = vanished.data();
   const TrainNetworkResult result =
-      TrainNetwork(ball.field, ball.views, map, {}, Quick(2), {}, &state);
+      TrainNetwork(ball.field, ball.views, map, Quick(2), {}, &state);
   EXPECT_LT(result.smallest_k, 1e-12);
   EXPECT_TRUE(warned(result));
 }
@@ -337,19 +333,19 @@ TEST(TrainNetwork, H29_PixelsThatAreNotFinite) {
   const SceneColorMap map = MapOf(ball);
   for (auto& view : ball.views) view.mask = nullptr;
   ball.targets[1].pixels[5] = std::nanf("");
-  const TrainNetworkResult result = TrainNetwork(ball.field, ball.views, map, {}, Quick(5), {});
+  const TrainNetworkResult result = TrainNetwork(ball.field, ball.views, map, Quick(5), {});
   EXPECT_EQ(result.left_out_pixels, 1);
   EXPECT_TRUE(std::isfinite(result.psnr_db));
   for (int i = 0; i < 30; ++i)
     ball.targets[1].pixels[static_cast<size_t>(i) * 3] = std::nanf("");
   try {
-    TrainNetwork(ball.field, ball.views, map, {}, Quick(5), {});
+    TrainNetwork(ball.field, ball.views, map, Quick(5), {});
     FAIL() << "30 of 576 pixels were accepted";
   } catch (const Error& error) {
     EXPECT_EQ(error.where(), "view 1");
   }
   ball.targets[1] = Image(20, 24);
-  EXPECT_THROW(TrainNetwork(ball.field, ball.views, map, {}, Quick(5), {}), Error);
+  EXPECT_THROW(TrainNetwork(ball.field, ball.views, map, Quick(5), {}), Error);
 }
 
 TEST(TrainNetwork, MaskedPixelsDoNotTeach) {
@@ -365,7 +361,7 @@ TEST(TrainNetwork, MaskedPixelsDoNotTeach) {
         for (size_t i = 0; i < mask.pixels.size(); ++i)
           if (mask.pixels[i] == 0) target.pixels[i * 3] = 0.9f;
     learned[run] =
-        TrainNetwork(ball.field, ball.views, map, {}, Quick(5), {}).network.data().parameters;
+        TrainNetwork(ball.field, ball.views, map, Quick(5), {}).network.data().parameters;
   }
   EXPECT_EQ(learned[0], learned[1]);
 }
@@ -377,8 +373,7 @@ TEST(TrainNetwork, H20_ConstantStyleRunsToCompletion) {
   for (auto& row : map.map.matrix.row) row = {0, 0, 0};
   map.map.offset = {0.4, 0.5, 0.6};
   map.k_est = 0;
-  const TrainNetworkResult result =
-      TrainNetwork(ball.field, ball.views, map, {}, Quick(10), {});
+  const TrainNetworkResult result = TrainNetwork(ball.field, ball.views, map, Quick(10), {});
   EXPECT_TRUE(std::isfinite(result.bound));
   EXPECT_GT(result.psnr_db, 40);
 }
@@ -392,7 +387,7 @@ TEST(TrainNetwork, SavesACheckpointWhenItIsStopped) {
     return p.done >= 3 ? LoopControl::kStop : LoopControl::kContinue;
   };
   hooks.checkpoint = [&](const TrainingState& state) { saved = state.step; };
-  EXPECT_THROW(TrainNetwork(ball.field, ball.views, map, {}, Quick(20), hooks), Interrupted);
+  EXPECT_THROW(TrainNetwork(ball.field, ball.views, map, Quick(20), hooks), Interrupted);
   EXPECT_EQ(saved, 3);
 }
 

@@ -24,8 +24,7 @@ TEST(TrainNetwork, H36_NoPairIsSteeperThanTheBoundOfWhatWasLearned) {
     ApplyStyleRecipe(recipe, &options);
     options.steps = 60;
     options.rays_per_step = 512;
-    const TrainNetworkResult result =
-        TrainNetwork(ball.field, ball.views, map, {}, options, {});
+    const TrainNetworkResult result = TrainNetwork(ball.field, ball.views, map, options, {});
     const double fraction = SteepestPair(result.network, pairs) / result.network.Bound();
     EXPECT_LE(fraction, 1) << recipe;
     EXPECT_GT(fraction, 0.02) << recipe;  // the attack is not idle
