@@ -69,17 +69,24 @@ std::vector<double> SplatDepthAlong(const RadianceField& field,
                                     const std::vector<Vec3d>& path) {
   constexpr double kFarthest = 4;  // standard deviations
   const SplatsView<float> splats = SplatsOf(field);
+  std::vector<double> reach(static_cast<size_t>(splats.count));  // negative: not drawn
+#pragma omp parallel for schedule(static)
+  for (int64_t i = 0; i < splats.count; ++i) {
+    const Vec3d scale = splats[i].log_scale.Cast<double>();
+    reach[static_cast<size_t>(i)] =
+        IsUsable(splats, i) ? kFarthest * std::exp(std::max({scale.x, scale.y, scale.z})) : -1;
+  }
   std::vector<double> depth(path.size() - 1);
 #pragma omp parallel for schedule(dynamic, 1)
   for (size_t k = 0; k < depth.size(); ++k) {
     const Vec3d middle = (path[k] + path[k + 1]) * 0.5, half = (path[k + 1] - path[k]) * 0.5;
     double sum = 0;
     for (int64_t i = 0; i < splats.count; ++i) {
-      if (!IsUsable(splats, i)) continue;
+      const Vec3d mean{splats.mean[3 * i], splats.mean[3 * i + 1], splats.mean[3 * i + 2]};
+      const double reached = reach[static_cast<size_t>(i)];
+      if (reached < 0 || Norm(mean - middle) > reached + Norm(half)) continue;
       const Splat<float> splat = splats[i];
-      const Vec3d scale = splat.log_scale.Cast<double>(), mean = splat.mean.Cast<double>();
-      const double longest = std::exp(std::max({scale.x, scale.y, scale.z}));
-      if (Norm(mean - middle) > kFarthest * longest + Norm(half)) continue;
+      const Vec3d scale = splat.log_scale.Cast<double>();
       // In the splat's own axes, in standard deviations.
       const Mat3d axes_from_world = RotationOf(Widened(splat.quaternion).data()).Transposed();
       Vec3d m = axes_from_world * (middle - mean), h = axes_from_world * half;

@@ -11,7 +11,7 @@ namespace regrade {
 namespace {
 
 constexpr size_t kPiece = 1 << 20;  // bytes at a time
-constexpr size_t kPart = 8 << 20;   // bytes that one thread compresses
+constexpr size_t kPart = 1 << 20;   // bytes that one thread compresses
 constexpr size_t kWindow = 1 << 15;
 constexpr char kHeader[] = "\x78\xda";  // a window of 32 KB, levels 7 to 9
 

@@ -1,10 +1,13 @@
 #include "pipeline/images/kept_pictures.h"
 
+#include <algorithm>
 #include <array>
 #include <map>
 #include <utility>
 #include <vector>
 
+#include "kernels/base/error.h"
+#include "kernels/base/parallel_tasks.h"
 #include "pipeline/images/image_file.h"
 
 namespace regrade {
@@ -59,8 +62,37 @@ Image KeptPictures::Read(const std::string& path) const {
     }
     return picture;
   }
-  Image picture = origin_ == Origin::kOurs ? ReadImage(path) : ReadGivenImage(path);
-  if (shared_->bytes_left <= 0) return picture;
+  Image picture = Decode(path);
+  Keep(path, picture);
+  return picture;
+}
+
+void KeptPictures::ReadAhead(const std::vector<std::string>& paths) const {
+  const int64_t count = std::ssize(paths);
+  for (int64_t begin = 0; begin < count && shared_->bytes_left > 0;) {
+    const int64_t end = std::min(count, begin + TasksAtOnce(0));
+    std::vector<Image> pictures(static_cast<size_t>(end - begin));
+    ParallelTasks(begin, end, [&](int64_t i) {
+      const std::string& path = paths[static_cast<size_t>(i)];
+      if (shared_->pictures.contains(path)) return;
+      try {
+        pictures[static_cast<size_t>(i - begin)] = Decode(path);
+      } catch (const Error&) {
+      }
+    });
+    for (; begin < end; ++begin)
+      if (Image& picture = pictures[pictures.size() - static_cast<size_t>(end - begin)];
+          !picture.empty())
+        Keep(paths[static_cast<size_t>(begin)], picture);
+  }
+}
+
+Image KeptPictures::Decode(const std::string& path) const {
+  return origin_ == Origin::kOurs ? ReadImage(path) : ReadGivenImage(path);
+}
+
+void KeptPictures::Keep(const std::string& path, const Image& picture) const {
+  if (shared_->bytes_left <= 0) return;
   Stored stored;
   stored.bytes = BytesOf(picture.pixels);
   if (stored.bytes.empty()) {
@@ -72,10 +104,9 @@ Image KeptPictures::Read(const std::string& path) const {
   }
   const int64_t size = std::ssize(stored.bytes) +
                        std::ssize(stored.picture.pixels) * static_cast<int64_t>(sizeof(float));
-  if (size > shared_->bytes_left) return picture;
+  if (size > shared_->bytes_left) return;
   shared_->bytes_left -= size;
   shared_->pictures.emplace(path, std::move(stored));
-  return picture;
 }
 
 }  // namespace regrade

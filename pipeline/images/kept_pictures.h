@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <memory>
 #include <string>
+#include <vector>
 
 #include "kernels/scene/image.h"
 
@@ -19,10 +20,16 @@ class KeptPictures {
 
   // As the reader gives it, to the bit. Errors: its.
   Image Read(const std::string& path) const;
+  // Decodes pictures that will be read, on all cores, as many as can be kept. Reports no
+  // errors: Read does.
+  void ReadAhead(const std::vector<std::string>& paths) const;
 
  private:
   struct Stored;
   struct Shared;
+  Image Decode(const std::string& path) const;
+  void Keep(const std::string& path, const Image& picture) const;
+
   Origin origin_;
   std::shared_ptr<Shared> shared_;
 };

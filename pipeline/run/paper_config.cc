@@ -170,7 +170,8 @@ JsonValue RecipeValues(const RunSettings& settings) {
   JsonValue values = JsonValue::Object();
   const JsonValue all = OptionValues(settings.network);
   for (const auto& [option, value] : all.AsObject())
-    if (option != "style-exact-sums" && option != "style-every-voxel")  // the same result
+    if (option != "style-exact-sums" && option != "style-every-voxel" &&
+        option != "style-batch")  // the same result
       values[option] = value;
   return values;
 }

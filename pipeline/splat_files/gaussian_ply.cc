@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "kernels/base/error.h"
+#include "kernels/base/parallel_tasks.h"
 #include "pipeline/files/text.h"
 
 namespace regrade {
@@ -43,6 +44,31 @@ void NameWhatIsIgnored(const PlyHeader& header, const GaussianLayout& layout,
   }
   for (size_t i = 0; i < header.elements.size(); ++i)
     if (i != layout.vertex) ignored->push_back("element " + Printable(header.elements[i].name));
+}
+
+// Of the next `count` rows.
+std::vector<SplatRecord> NextRecords(PlyRows* rows, const GaussianLayout& layout,
+                                     uint64_t count) {
+  std::vector<SplatRecord> records(count);
+  const auto read = [&](PlyRows* from, uint64_t begin, uint64_t end) {
+    for (uint64_t i = begin; i < end; ++i) {
+      from->Next();
+      records[i] = RecordOf(*from, layout);
+    }
+  };
+  if (!rows->have_one_length()) {
+    read(rows, 0, count);
+    return records;
+  }
+  constexpr uint64_t kPart = 1024;
+  ParallelTasks(0, static_cast<int64_t>((count + kPart - 1) / kPart), [&](int64_t part) {
+    const uint64_t begin = kPart * static_cast<uint64_t>(part);
+    PlyRows own = *rows;
+    own.Skip(begin);
+    read(&own, begin, std::min(count, begin + kPart));
+  });
+  rows->Skip(count);
+  return records;
 }
 
 }  // namespace
@@ -89,10 +115,10 @@ SplatScene ReadGaussianPly(std::string_view bytes, const PlyHeader& header, uint
   const uint64_t count = header.elements[layout.vertex].count;
   PlyRows rows(bytes, header, layout.vertex, where);
   SplatCollector collector(count, layout.basis, bytes.size(), budget, where);
-  for (uint64_t i = 0; i < count; ++i) {
-    rows.Next();
-    collector.Add(RecordOf(rows, layout));
-  }
+  constexpr uint64_t kAtOnce = 1 << 16;
+  for (uint64_t i = 0; i < count; i += kAtOnce)
+    for (const SplatRecord& record : NextRecords(&rows, layout, std::min(kAtOnce, count - i)))
+      collector.Add(record);
   SplatScene scene = std::move(collector).Finish();
   scene.format = SplatFormat::kPly;
   scene.antialiased = SaysAntialiased(header);

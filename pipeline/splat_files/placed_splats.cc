@@ -13,6 +13,7 @@ void MoveSplats(const Similarity& target_from_source, Splats* splats) {
   const SplatTurn turn(target_from_source.rotation);
   const double log_scale = std::log(target_from_source.scale);
   const int64_t width = 3 * splats->basis;
+#pragma omp parallel for schedule(static)
   for (int64_t i = 0; i < splats->count(); ++i) {
     SplatRecord record = SplatAt(splats->view(), i);
     const Vec3d mean = target_from_source * record.splat.mean.Cast<double>();
@@ -49,6 +50,7 @@ std::vector<float> ColorsBeforeMove(const Similarity& target_from_source,
   const size_t width = 3 * static_cast<size_t>(basis);
   REGRADE_CHECK(sh.size() % width == 0);
   std::vector<float> before(sh.size());
+#pragma omp parallel for schedule(static)
   for (size_t i = 0; i < sh.size(); i += width) {
     SplatRecord record;
     std::copy_n(sh.begin() + static_cast<long>(i), width, record.sh);

@@ -51,7 +51,7 @@ PlyRows::PlyRows(std::string_view bytes, const PlyHeader& header, size_t element
       element_(&header.elements[element]),
       where_(std::move(where)),
       left_(bytes.substr(header.bytes)) {
-  for (size_t i = 0; i < element; ++i) Skip(header.elements[i]);
+  for (size_t i = 0; i < element; ++i) SkipElement(header.elements[i]);
   CheckCount(*element_);
   cells_.resize(element_->properties.size());
 }
@@ -67,7 +67,7 @@ void PlyRows::CheckCount(const PlyElement& element) const {
                      where_, kDamaged);
 }
 
-void PlyRows::Skip(const PlyElement& element) {
+void PlyRows::SkipElement(const PlyElement& element) {
   CheckCount(element);
   if (element.properties.empty()) return;
   for (uint64_t i = 0; i < element.count; ++i)
@@ -116,6 +116,19 @@ void PlyRows::Take(const PlyProperty& property) {
                             "' has a negative length"),
                      where_, kDamaged);
   TakeBytes(static_cast<uint64_t>(items) * SizeOf(property.type));
+}
+
+bool PlyRows::have_one_length() const {
+  return header_.encoding != PlyEncoding::kAscii &&
+         std::ranges::none_of(element_->properties, [](const PlyProperty& property) {
+           return property.count_type.has_value();
+         });
+}
+
+void PlyRows::Skip(uint64_t rows) {
+  REGRADE_CHECK(have_one_length());
+  TakeBytes(rows * element_->RowBytes(header_.encoding));
+  row_ += rows;
 }
 
 void PlyRows::Next() {

@@ -17,6 +17,10 @@ class PlyRows {
   // before, or is too short for as many rows as the header says.
   PlyRows(std::string_view bytes, const PlyHeader& header, size_t element, std::string where);
 
+  // Whether all rows have one length, so that Skip goes over them at once.
+  bool have_one_length() const;
+  // Goes over rows of one length.
+  void Skip(uint64_t rows);
   // Goes to the next row; called at most `count` times. Throws Error(kInput).
   void Next();
   // The bytes of a property in the file: of a text without separators, of a list with its
@@ -29,7 +33,7 @@ class PlyRows {
   std::string_view left() const { return left_; }
 
  private:
-  void Skip(const PlyElement& element);
+  void SkipElement(const PlyElement& element);
   void CheckCount(const PlyElement& element) const;
   void Take(const PlyProperty& property);
   std::string_view TakeBytes(uint64_t size);

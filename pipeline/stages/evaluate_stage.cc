@@ -48,9 +48,11 @@ namespace {
 // The pictures `folder`/00000.png, ... of the given views.
 FrameSource FramesOf(const KeptPictures& kept, const std::string& folder,
                      const std::vector<int>& views) {
-  return {static_cast<int>(views.size()), [kept, folder, views](int i) {
-            return kept.Read(folder + "/" + FrameName(views[i]));
-          }};
+  std::vector<std::string> paths;
+  for (const int i : views) paths.push_back(folder + "/" + FrameName(i));
+  kept.ReadAhead(paths);
+  return {static_cast<int>(paths.size()),
+          [kept, paths](int i) { return kept.Read(paths[static_cast<size_t>(i)]); }};
 }
 
 void Append(std::vector<NamedFrameSource> more, std::vector<NamedFrameSource>* sequences) {
@@ -335,6 +337,7 @@ StageOutcome Evaluate(RunContext* context, const ProgressFunction& progress) {
   const FidelityRow to_photos = MeasureFidelity({"styled", frames("styled", wanted)},
                                                 photo_targets, parts.Next(n * kFrameSeconds));
 
+  const Backend backend = ChooseBackend(settings.run.device, settings.run.reproducible);
   EvaluateReport report;
   report.flow = settings.consistency.flow;
   report.mask = settings.consistency.mode;
@@ -350,10 +353,9 @@ StageOutcome Evaluate(RunContext* context, const ProgressFunction& progress) {
           ? Metric::Undefined("one map of the whole scene does not compare with an object's")
           : Metric(LinearMapPsnr(stored.field, training_cameras,
                                  frames("source", training_views), targets.views_2d,
-                                 targets.transmittance, training_gains,
+                                 targets.transmittance, training_gains, backend,
                                  parts.Next(n * kLinearMapSeconds)));
   if (!settings.consistency.lpips.empty()) {
-    const Backend backend = ChooseBackend(settings.run.device, settings.run.reproducible);
     const auto lpips = [&](const std::vector<int>& of) {
       return MeanOf(
           MeasureOnPhotos(context->Views(), of, stored, backend, networks.perceptual).lpips);

@@ -64,14 +64,14 @@ std::optional<double> LinearMapPsnr(const RadianceField& field,
                                     const std::vector<Camera>& cameras,
                                     const FrameSource& source, const FrameSource& views_2d,
                                     const FrameSource& transmittance, const PhotoGains& gains,
-                                    const ProgressFunction& progress) {
+                                    Backend backend, const ProgressFunction& progress) {
   const std::optional<ColorMap> better =
       BestLinearMap(UndoGains(source, gains), UndoGains(views_2d, gains));
   if (!better) return std::nullopt;
   RadianceField mapped = field;
   mapped.appearance = ApplyColorMap(field.appearance, *better);
   mapped.background = MapBackground(*better, field.background);
-  const FieldRenderer renderer(mapped, Backend::kCpu);
+  const FieldRenderer renderer(mapped, backend);
   const FrameSource rendered{source.count,
                              [&](int i) { return renderer.Render(cameras[i]).color; }};
   return MeasureFidelity({"linear_map", PutGains(rendered, gains)},

@@ -7,6 +7,7 @@
 #include "evaluate/frame_source.h"
 #include "kernels/base/progress.h"
 #include "kernels/field/radiance_field.h"
+#include "kernels/render/field_renderer.h"
 #include "kernels/scene/camera.h"
 #include "pipeline/capture/photo_gains.h"
 #include "stylize/linear_map.h"
@@ -25,6 +26,6 @@ std::optional<double> LinearMapPsnr(const RadianceField& field,
                                     const std::vector<Camera>& cameras,
                                     const FrameSource& source, const FrameSource& views_2d,
                                     const FrameSource& transmittance, const PhotoGains& gains,
-                                    const ProgressFunction& progress);
+                                    Backend backend, const ProgressFunction& progress);
 
 }  // namespace regrade

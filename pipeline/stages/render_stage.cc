@@ -6,6 +6,7 @@
 // it is measured.
 #include <algorithm>
 #include <filesystem>
+#include <future>
 #include <memory>
 #include <optional>
 
@@ -115,13 +116,13 @@ double WorkOf(const FrameSet& set) {
 }
 
 // The renderers of the scene's field and of the style's. Fields have gigabytes: neither stays.
-void PrepareFields(const RunContext& context, Backend backend, StoredField before,
-                   FrameRenderers* renderers, std::vector<std::string>* outputs) {
+// Returns the writing of the styled splats, see WriteStyledSplats.
+std::future<void> PrepareFields(const RunContext& context, Backend backend, StoredField before,
+                                FrameRenderers* renderers, std::vector<std::string>* outputs) {
   const RunSettings& settings = context.settings;
   const Workspace& style = *context.style;
   renderers->source.emplace(before.field, backend);
-  const StoredField after =
-      StyledFieldOf(std::move(before), style.folder(), settings.style.strength);
+  StoredField after = StyledFieldOf(std::move(before), style.folder(), settings.style.strength);
   const std::string kept = style.Path("styled.npz");
   if (settings.style.keep_field) {
     WriteFieldFile(kept, after);
@@ -129,8 +130,10 @@ void PrepareFields(const RunContext& context, Backend backend, StoredField befor
   } else {
     std::filesystem::remove(kept);  // of an earlier style
   }
-  if (WriteStyledSplats(context, after)) outputs->push_back(kStyledSplats);
   renderers->styled.emplace(after.field, backend);
+  std::future<void> splats = WriteStyledSplats(context, std::move(after));
+  if (splats.valid()) outputs->push_back(kStyledSplats);
+  return splats;
 }
 
 StageOutcome Render(RunContext* context, const ProgressFunction& progress) {
@@ -150,7 +153,8 @@ StageOutcome Render(RunContext* context, const ProgressFunction& progress) {
   const Backend backend = ChooseBackend(settings.run.device, settings.run.reproducible);
   StageOutcome outcome;
   outcome.outputs = {"frames"};
-  PrepareFields(*context, backend, std::move(before), &renderers, &outcome.outputs);
+  std::future<void> splats =
+      PrepareFields(*context, backend, std::move(before), &renderers, &outcome.outputs);
   renderers.stylizer = MakeSceneStylizer(context, views, masks.get(),
                                          [&](const Image&, int) { return renderers.coverage; });
   renderers.edit.emplace(settings.residual, views, *renderers.source);
@@ -213,6 +217,7 @@ StageOutcome Render(RunContext* context, const ProgressFunction& progress) {
   }
   WriteFrameNames(views, workspace);
   if (has_film) films.Finish(&outcome.outputs);
+  if (splats.valid()) splats.get();
   if (!films.why_none().empty()) context->console->Warn("no film: " + films.why_none());
   RenderReport report;
   report.device = DeviceName(backend);

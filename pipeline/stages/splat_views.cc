@@ -10,6 +10,7 @@
 
 #include "kernels/base/error.h"
 #include "kernels/base/hash.h"
+#include "kernels/base/parallel_tasks.h"
 #include "kernels/render/field_renderer.h"
 #include "pipeline/capture/bare_cameras.h"
 #include "pipeline/capture/capture_cameras.h"
@@ -37,6 +38,14 @@ std::vector<StagedPhoto> RenderViews(const std::vector<BareCamera>& cameras,
                                      const FieldRenderer& renderer, const std::string& folder,
                                      const ProgressFunction& progress, ColmapModel* model) {
   std::vector<StagedPhoto> photos;
+  std::vector<Image> rendered;  // not yet written
+  const auto write = [&] {
+    const int64_t first = std::ssize(photos) - std::ssize(rendered);
+    ParallelTasks(0, std::ssize(rendered), [&](int64_t i) {
+      WritePng8(photos[static_cast<size_t>(first + i)].path, rendered[static_cast<size_t>(i)]);
+    });
+    rendered.clear();
+  };
   for (const auto& [name, camera] : cameras) {
     const size_t i = photos.size();
     ReportOrThrow(progress, static_cast<double>(i), static_cast<double>(cameras.size()));
@@ -45,12 +54,15 @@ std::vector<StagedPhoto> RenderViews(const std::vector<BareCamera>& cameras,
     photo.name = Format("%05zu.png", i);
     photo.path = folder + "/" + photo.name;
     photo.width = camera.width, photo.height = camera.height;
-    WritePng8(photo.path, renderer.Render(camera).color);
+    rendered.push_back(renderer.Render(camera).color);
     const auto id = static_cast<uint32_t>(i + 1);
     model->cameras.push_back({id, ColmapLens::kPinhole, camera});
     model->images.push_back({id, id, photo.name, camera.camera_from_world, {}});
     photos.push_back(std::move(photo));
+    const auto bytes = std::ssize(rendered[0].pixels) * static_cast<int64_t>(sizeof(float));
+    if (std::ssize(rendered) >= TasksAtOnce(bytes)) write();
   }
+  write();
   return photos;
 }
 

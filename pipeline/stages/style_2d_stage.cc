@@ -3,6 +3,7 @@
 #include <optional>
 
 #include "kernels/base/error.h"
+#include "kernels/base/parallel_tasks.h"
 #include "kernels/image/color_statistics.h"
 #include "kernels/render/field_renderer.h"
 #include "pipeline/capture/photo_gains.h"
@@ -11,6 +12,7 @@
 #include "pipeline/files/text.h"
 #include "pipeline/images/image_file.h"
 #include "pipeline/program/device_choice.h"
+#include "pipeline/program/ordered_worker.h"
 #include "pipeline/report/stage_metrics.h"
 #include "pipeline/run/run_context.h"
 #include "pipeline/stages/make_stylizer.h"
@@ -68,17 +70,28 @@ StageOutcome StyleViews(RunContext* context, const ProgressFunction& progress) {
   MaskFiller filler(context, views);
   const int count = static_cast<int>(capture.views.size());
   int styled = 0;
-  for (int i = 0; i < count; ++i) {
+  OrderedWorker writer;
+  const auto is_known = [&](int64_t view) {
+    const int i = static_cast<int>(view);
+    return stylizer->Knows(i) && (masks == nullptr || masks->Knows(i));
+  };
+  const auto read = [&](int64_t view) {
+    return is_known(view) ? views.Photo(static_cast<int>(view)) : Image();
+  };
+  MakeAhead(count, views.PhotoBytes(), read, [&](int64_t view, Image photo) {
+    const int i = static_cast<int>(view);
     ReportOrThrow(progress, i, count);
-    if (!stylizer->Knows(i) || (masks != nullptr && !masks->Knows(i))) continue;
+    if (!is_known(i)) return;
     ++styled;
-    Image photo = views.Photo(i);
     filler.Fill(i, &photo);
     Image picture = stylizer->Stylize(photo, i);
     // A finished picture is one of the photo as it was taken.
     if (!stylizer->StylesAnything()) picture = views.AsSeen(i, std::move(picture));
-    WritePng8(workspace.NewPath("views_2d/" + FrameName(i)), picture);
-  }
+    writer.Do([&workspace, i, picture = std::move(picture)] {
+      WritePng8(workspace.NewPath("views_2d/" + FrameName(i)), picture);
+    });
+  });
+  writer.Finish();
   StageOutcome outcome;
   outcome.outputs = {"views_2d"};
   PutMetrics(Style2dReport{{}, stylizer->Name(), styled, notices}, &outcome.metrics);

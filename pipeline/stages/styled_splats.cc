@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <filesystem>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "kernels/base/error.h"
@@ -44,24 +45,26 @@ std::vector<bool> Untouched(const RunContext& context, const Appearance& styled)
 
 }  // namespace
 
-bool WriteStyledSplats(const RunContext& context, const StoredField& styled) {
+std::future<void> WriteStyledSplats(const RunContext& context, StoredField styled) {
   const std::string path = context.style->Path(kStyledSplats);
   const auto record = context.workspace->Find("reconstruct");
   const JsonValue* const hash = record ? record->inputs.Find("splats") : nullptr;
   if (hash == nullptr) {
     std::filesystem::remove(path);
-    return false;
+    return {};
   }
-  const Appearance& colors = styled.field.appearance;
-  if (CanCopy(context, hash->AsString()))
-    WriteRestyled(context.source, path,
-                  ColorsBeforeMove(styled.field_from_world,
-                                   {colors.sh.data(), static_cast<size_t>(colors.sh.size())},
-                                   colors.basis),
-                  colors.basis, CommentOf(context), Untouched(context, colors));
-  else
-    WriteSplatPly(path, styled, CommentOf(context));
-  return true;
+  return std::async(std::launch::async, [&context, path, hash = hash->AsString(),
+                                         styled = std::move(styled)] {
+    const Appearance& colors = styled.field.appearance;
+    if (CanCopy(context, hash))
+      WriteRestyled(context.source, path,
+                    ColorsBeforeMove(styled.field_from_world,
+                                     {colors.sh.data(), static_cast<size_t>(colors.sh.size())},
+                                     colors.basis),
+                    colors.basis, CommentOf(context), Untouched(context, colors));
+    else
+      WriteSplatPly(path, styled, CommentOf(context));
+  });
 }
 
 }  // namespace regrade

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "kernels/base/error.h"
+#include "kernels/base/parallel_tasks.h"
 #include "pipeline/capture/working_views.h"
 #include "pipeline/fields/field_file.h"
 #include "pipeline/fields/network_checkpoint.h"
@@ -104,11 +105,20 @@ StyleTargets ReadStyleTargets(const Workspace& folder, const WorkingViews& views
                               const RadianceField& field, const std::vector<int>& indices,
                               const ObjectMasks* object, const ObjectWeights& weights) {
   StyleTargets targets(field, object, &weights);
-  for (const int i : indices) {
-    const std::string name = "views_2d/" + FrameName(i);
-    targets.Add({i, views.CameraOf(i), name, views.Mask(i), [&] { return views.Photo(i); },
-                 [&] { return ReadImage(folder.Path(name)); }});
-  }
+  const auto name = [](int view) { return "views_2d/" + FrameName(view); };
+  using Pictures = std::pair<Image, Image>;
+  MakeAhead(
+      std::ssize(indices), views.PhotoBytes(),
+      [&](int64_t k) -> Pictures {
+        const int i = indices[static_cast<size_t>(k)];
+        return {views.Photo(i), ReadImage(folder.Path(name(i)))};
+      },
+      [&](int64_t k, Pictures pictures) {
+        const int i = indices[static_cast<size_t>(k)];
+        targets.Add({i, views.CameraOf(i), name(i), views.Mask(i),
+                     [&] { return std::move(pictures.first); },
+                     [&] { return std::move(pictures.second); }});
+      });
   return targets;
 }
 

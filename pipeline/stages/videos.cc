@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <future>
 
 #include "kernels/base/error.h"
 
@@ -45,8 +46,11 @@ void RunFilms::Add(int index, const Image& source, const Image& styled) {
   try {
     Open(kStyledFilm, styled, frames_per_second_, &film_);
     Open(kWipeFilm, styled, frames_per_second_, &wipe_);
+    std::future<void> beside = std::async(std::launch::async, [&] {
+      wipe_->Add(Wipe(source, styled, WipeBorder(styled.width, index, frames_)));
+    });
     film_->Add(styled);
-    wipe_->Add(Wipe(source, styled, WipeBorder(styled.width, index, frames_)));
+    beside.get();
   } catch (const Error& error) {
     if (error.code() != ExitCode::kExternalProgram) throw;
     GiveUp(error.what_failed());
@@ -73,8 +77,9 @@ void RunFilms::GiveUp(const std::string& why) {
 
 void RunFilms::Finish(std::vector<std::string>* outputs) {
   if (!film_) return;
+  std::future<void> beside = std::async(std::launch::async, [this] { wipe_->Finish(); });
   film_->Finish();
-  wipe_->Finish();
+  beside.get();
   outputs->insert(outputs->end(), {kStyledFilm, kWipeFilm});
   if (!frame_by_frame_) return;
   frame_by_frame_->Finish();

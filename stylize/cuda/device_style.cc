@@ -22,12 +22,13 @@ void AddBaseMap(const LipschitzNetworkData& data, const float* features, int64_t
   AddMappedRows({data.basis}, map.matrix, map.constant, features, n, rows);
 }
 
-// Grown, never shrunk: what one step needed the next one needs about as much of.
+// Grown, never shrunk: what one step needed the next one needs about as much of. An eighth more
+// than asked for: whole views of a large field take gigabytes.
 template <typename T>
 void Reserve(int64_t size, const char* what, DeviceBuffer<T>* buffer) {
   if (buffer->size() >= size) return;
   *buffer = {};
-  *buffer = DeviceBuffer<T>(size + size / 4, what);
+  *buffer = DeviceBuffer<T>(size + size / 8, what);
 }
 
 class DeviceStyleLoss : public StyleLoss {
@@ -49,8 +50,7 @@ class DeviceStyleLoss : public StyleLoss {
     AggregationResult result = Touch(network, batch);
     const MlpPrecision precision =
         gradient != nullptr ? MlpPrecision::kTensor : MlpPrecision::kSplit;
-    Forward(network.Effective<float>(), precision);
-    AddBaseMap(network.data(), features_.data(), slots_.num_slots, rows_.data());
+    Forward(network, network.Effective<float>(), precision, true);
     if (gradient != nullptr) {
       const int64_t values = slots_.num_slots * stride_;
       Reserve(values, "gradients of styled voxels", &d_rows_);
@@ -65,9 +65,14 @@ class DeviceStyleLoss : public StyleLoss {
                            d_color_.data(), d_rows_.data(), exact_rows_.data());
     });
     if (gradient != nullptr) {
-      AddViewPenalty(field_.row(), BaseOf(network.data()).matrix, features_.data(),
-                     rows_.data(), slots_.num_slots, static_cast<float>(options_.view_weight),
-                     d_rows_.data(), &sums_.data()->loss);
+      const Mat3f base = BaseOf(network.data()).matrix;
+      ForEachBatch(network, [&](int64_t begin, int64_t count) {
+        float* const d_rows = d_rows_.data() + begin * stride_;
+        AddViewPenalty(field_.row(), base, features_.data(), rows_.data() + begin * stride_,
+                       count, static_cast<float>(options_.view_weight), d_rows,
+                       &sums_.data()->loss);
+        mlp_->AddAdjoint(precision, features_.data(), d_rows, count);
+      });
     }
     DeviceColorLoss sums;
     sums_.CopyOut(&sums, 1);
@@ -78,7 +83,6 @@ class DeviceStyleLoss : public StyleLoss {
                                                    : 3.0 * static_cast<double>(result.rays);
     result.loss = sums.loss / count;
     if (gradient == nullptr) return result;
-    mlp_->AddAdjoint(precision, features_.data(), d_rows_.data(), slots_.num_slots);
     DenseNetwork<double> d_effective;
     for (int l = 0; l < kNetworkLayers; ++l)
       d_effective.layers.emplace_back(network.Outputs(l), network.Inputs(l));
@@ -92,8 +96,7 @@ class DeviceStyleLoss : public StyleLoss {
   HiddenSums SumHidden(const LipschitzNetwork& network, const StyleRays& batch) override {
     Touch(network, batch);
     const int64_t n = static_cast<int64_t>(batch.rays.size());
-    Forward(network.Effective<float>(), MlpPrecision::kSplit);
-    AddBaseMap(network.data(), features_.data(), slots_.num_slots, rows_.data());
+    Forward(network, network.Effective<float>(), MlpPrecision::kSplit, true);
     std::vector<Vec3f> color(static_cast<size_t>(n));
     std::vector<float> transmittance(static_cast<size_t>(n));
     ForEachBand([&](int64_t begin, int64_t count) {
@@ -116,7 +119,7 @@ class DeviceStyleLoss : public StyleLoss {
     std::vector<float> band(static_cast<size_t>(n * stride_));
     DeviceBuffer<float> of_rays(std::min(n, kBandRays) * stride_, "hidden sums of rays");
     for (int half = 0; half < kMlpHidden; half += stride_) {
-      Forward(HiddenUnits(network, half), MlpPrecision::kSplit);
+      Forward(network, HiddenUnits(network, half), MlpPrecision::kSplit, false);
       ForEachBand([&](int64_t begin, int64_t count) {
         BlendRows(field_, weights_, slots_, rows_.data(), of_rays.data(),
                   Exact(count * stride_, &exact_sums_));
@@ -130,7 +133,7 @@ class DeviceStyleLoss : public StyleLoss {
   }
 
  private:
-  // Which voxels the rays touch, and their features.
+  // Which voxels the rays touch.
   AggregationResult Touch(const LipschitzNetwork& network, const StyleRays& batch) {
     REGRADE_CHECK_EQ(network.row().stride(), stride_);
     batch_ = &batch;
@@ -147,20 +150,36 @@ class DeviceStyleLoss : public StyleLoss {
     }
     slots_.Assign(&touched_);
     result.touched_voxels = slots_.num_slots;
-    Reserve(slots_.num_slots * stride_, "features of touched voxels", &features_);
+    Reserve(std::min(slots_.num_slots, options_.batch) * stride_, "features of a batch",
+            &features_);
     Reserve(slots_.num_slots * stride_, "styled voxels", &rows_);
-    GatherRows(field_, slots_.point_of_slot.data(), 0, slots_.num_slots,
-               network.data().position_scale, features_.data());
     return result;
   }
 
-  void Forward(const DenseNetwork<float>& network, MlpPrecision precision) {
-    const FusedMlp fused = MakeFusedMlp(network);
+  // body(first slot, slots) with features_ of these.
+  template <typename Body>
+  void ForEachBatch(const LipschitzNetwork& network, const Body& body) {
+    for (int64_t begin = 0; begin < slots_.num_slots; begin += options_.batch) {
+      const int64_t count = std::min(options_.batch, slots_.num_slots - begin);
+      GatherRows(field_, slots_.point_of_slot.data() + begin, 0, count,
+                 network.data().position_scale, features_.data());
+      body(begin, count);
+    }
+  }
+
+  // rows_ of `layers` on the features of `network`, and its base map on top.
+  void Forward(const LipschitzNetwork& network, const DenseNetwork<float>& layers,
+               MlpPrecision precision, bool with_base) {
+    const FusedMlp fused = MakeFusedMlp(layers);
     if (mlp_ == nullptr)
       mlp_ = std::make_unique<DeviceMlp>(fused);
     else
       mlp_->Set(fused);
-    mlp_->Forward(precision, features_.data(), slots_.num_slots, rows_.data());
+    ForEachBatch(network, [&](int64_t begin, int64_t count) {
+      float* const rows = rows_.data() + begin * stride_;
+      mlp_->Forward(precision, features_.data(), count, rows);
+      if (with_base) AddBaseMap(network.data(), features_.data(), count, rows);
+    });
   }
 
   void March(int64_t begin, DeviceTouched* touched) {
@@ -216,7 +235,8 @@ class DeviceStyleLoss : public StyleLoss {
   DeviceBuffer<Ray> rays_;
   DeviceBuffer<Vec3f> targets_, color_, d_color_;
   DeviceBuffer<uint8_t> unclamped_;
-  DeviceBuffer<float> features_, rows_, d_rows_;  // [slots, stride_]
+  DeviceBuffer<float> rows_, d_rows_;  // [slots, stride_]
+  DeviceBuffer<float> features_;       // [slots of a batch, stride_]
   DeviceBuffer<float> exact_rows_, exact_sums_;
   DeviceBuffer<DeviceColorLoss> sums_;
 };

@@ -88,15 +88,14 @@ void GradientAggregation::March(const StyleRays& batch, int64_t begin, int64_t e
   Touch(band);
 }
 
-void GradientAggregation::FillTouchedFeatures(float position_scale) {
-  const int64_t slots = std::ssize(touched_);
+void GradientAggregation::FillTouchedFeatures(float position_scale, int64_t begin,
+                                              int64_t count) {
   const int64_t voxels = field_.geometry->num_voxels();
-  features_.Resize(slots * row_.stride());
-  sh_.Resize(slots * row_.stride());
+  features_.Resize(count * row_.stride());
 #pragma omp parallel for schedule(static)
-  for (int64_t s = 0; s < slots; ++s) {
-    const int32_t point = touched_[s];
-    float* const row = features_.data() + s * row_.stride();
+  for (int64_t i = 0; i < count; ++i) {
+    const int32_t point = touched_[begin + i];
+    float* const row = features_.data() + i * row_.stride();
     if (point < voxels) {
       FillFeatures(field_, position_scale, point, vertex_of_voxel_[point], row);
     } else {
@@ -104,6 +103,16 @@ void GradientAggregation::FillTouchedFeatures(float position_scale) {
       const size_t column = static_cast<size_t>(texel / field_.geometry->spheres.layers);
       FillTexelFeatures(field_, position_scale, texel, place_of_column_[column], row);
     }
+  }
+}
+
+template <typename Body>
+void GradientAggregation::ForEachBatch(float position_scale, const Body& body) {
+  const int64_t slots = std::ssize(touched_);
+  for (int64_t begin = 0; begin < slots; begin += options_.batch) {
+    const int64_t count = std::min(options_.batch, slots - begin);
+    FillTouchedFeatures(position_scale, begin, count);
+    body(begin, count);
   }
 }
 
@@ -146,15 +155,15 @@ void GradientAggregation::Scatter(const StyleRays& batch, const Band& band) {
   }
 }
 
-double GradientAggregation::AddViewPenalty(const LipschitzNetworkData& data) {
-  const int64_t slots = std::ssize(touched_);
+double GradientAggregation::AddViewPenalty(const LipschitzNetworkData& data, int64_t begin,
+                                           int64_t count) {
   const RowMap map = BaseOf(data);
-  std::vector<double> sums(slots);  // summed up in order below
+  std::vector<double> sums(count);  // summed up in order below
 #pragma omp parallel for schedule(static)
-  for (int64_t s = 0; s < slots; ++s) {
+  for (int64_t s = 0; s < count; ++s) {
     const float* const from = features_.data() + s * row_.stride();
-    const float* const styled = sh_.data() + s * row_.stride();
-    float* const d = d_sh_.data() + s * row_.stride();
+    const float* const styled = sh_.data() + (begin + s) * row_.stride();
+    float* const d = d_sh_.data() + (begin + s) * row_.stride();
     float* const mass = d + row_.mass();
     for (int c = 0; c < 3; ++c) {
       for (int k = 1; k < row_.basis; ++k) {
@@ -197,8 +206,11 @@ AggregationResult GradientAggregation::Run(const LipschitzNetwork& network,
   }
   const int64_t slots = std::ssize(touched_);
   result.touched_voxels = slots;
-  FillTouchedFeatures(network.data().position_scale);
-  network.Forward(features_.data(), slots, sh_.data());
+  const float position_scale = network.data().position_scale;
+  sh_.Resize(slots * row_.stride());
+  ForEachBatch(position_scale, [&](int64_t begin, int64_t count) {
+    network.Forward(features_.data(), count, sh_.data() + begin * row_.stride());
+  });
   if (gradient != nullptr) {
     d_sh_.Clear();
     d_sh_.Resize(slots * row_.stride());
@@ -222,7 +234,17 @@ AggregationResult GradientAggregation::Run(const LipschitzNetwork& network,
     }
     if (gradient != nullptr) Scatter(batch, band);
   }
-  if (gradient != nullptr) loss_sum += AddViewPenalty(network.data());
+  DenseNetwork<double> d_effective;
+  if (gradient != nullptr) {
+    for (int l = 0; l < kNetworkLayers; ++l)
+      d_effective.layers.emplace_back(network.Outputs(l), network.Inputs(l));
+    const FusedMlp fused = MakeFusedMlp(network.Effective<float>());
+    ForEachBatch(position_scale, [&](int64_t begin, int64_t count) {
+      loss_sum += AddViewPenalty(network.data(), begin, count);
+      FusedAdjoint(fused, features_.data(), d_sh_.data() + begin * row_.stride(), count,
+                   &d_effective);
+    });
+  }
   ForgetTouched();
 
   const double count = options_.divide_by_voxels
@@ -232,11 +254,6 @@ AggregationResult GradientAggregation::Run(const LipschitzNetwork& network,
   result.loss = loss_sum / count;
   if (gradient == nullptr) return result;
 
-  DenseNetwork<double> d_effective;
-  for (int l = 0; l < kNetworkLayers; ++l)
-    d_effective.layers.emplace_back(network.Outputs(l), network.Inputs(l));
-  FusedAdjoint(MakeFusedMlp(network.Effective<float>()), features_.data(), d_sh_.data(), slots,
-               &d_effective);
   std::vector<double> sum(gradient->size());
   network.AddGradient(d_effective, &sum);
   for (size_t i = 0; i < sum.size(); ++i) (*gradient)[i] += sum[i] / count;
@@ -251,9 +268,11 @@ StyleLoss::HiddenSums GradientAggregation::SumHidden(const LipschitzNetwork& net
   for (int64_t begin = 0; begin < num_rays; begin += kBandRays) {
     March(batch, begin, std::min(num_rays, begin + kBandRays), &band);
     const RayWeights& weights = band.weights;
-    const int64_t slots = std::ssize(touched_);
-    FillTouchedFeatures(network.data().position_scale);
-    network.Forward(features_.data(), slots, sh_.data());
+    const float position_scale = network.data().position_scale;
+    sh_.Resize(std::ssize(touched_) * row_.stride());
+    ForEachBatch(position_scale, [&](int64_t first, int64_t count) {
+      network.Forward(features_.data(), count, sh_.data() + first * row_.stride());
+    });
     RenderColors(batch, &band);
     const size_t row = sums.opacity.size();
     for (int64_t r = 0; r < weights.num_rays(); ++r) {
@@ -264,8 +283,10 @@ StyleLoss::HiddenSums GradientAggregation::SumHidden(const LipschitzNetwork& net
     }
     sums.hidden.resize(sums.opacity.size() * kMlpHidden);
     for (int half = 0; half < kMlpHidden; half += row_.stride()) {
-      FusedForward(MakeFusedMlp(HiddenUnits(network, half)), features_.data(), slots,
-                   sh_.data());
+      const FusedMlp units = MakeFusedMlp(HiddenUnits(network, half));
+      ForEachBatch(position_scale, [&](int64_t first, int64_t count) {
+        FusedForward(units, features_.data(), count, sh_.data() + first * row_.stride());
+      });
       size_t next = row;
       for (int64_t r = 0; r < weights.num_rays(); ++r) {
         if (!Counts(batch, band, r)) continue;

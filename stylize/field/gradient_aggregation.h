@@ -42,6 +42,7 @@ struct AggregationOptions {
   double view_weight = 0;         // lambda_view of EQ(view-penalty)
   bool divide_by_voxels = false;  // 1 / B instead of 1 / (3 Q)
   bool every_voxel = false;       // through f at each step, as in Algorithm 1: same gradient
+  int64_t batch = 1 << 20;        // points that pass f at a time, as in Algorithm 1
   bool exact_sums = false;        // on a device; the CPU's sums have a fixed order
 
   // Without `march`, which is the field's, and divide_by_voxels, see TrainNetworkOptions.
@@ -74,6 +75,13 @@ struct AggregationOptions {
                   "Algorithm 1, instead of those that the step's rays touch: same result, "
                   "slower; for timing",
           .constant = true});
+    bind("style-batch", batch,
+         {.unit = "voxels",
+          .help = "how many pass the network at a time, as in the paper's Algorithm 1; more "
+                  "take more memory, and no less time",
+          .min = 1024,
+          .max = 1e9,
+          .constant = true});
     bind("style-exact-sums", exact_sums,
          {.help = "GPU: sums colours and gradients as integers, so that two trainings on the "
                   "same card are bitwise equal; slower, and more memory",
@@ -99,7 +107,8 @@ class StyleLoss {
   virtual ~StyleLoss() = default;
 
   // Adds the gradient of L_rec to `gradient` [network.NumParameters()] unless it is
-  // null. Rays are taken in bands, so memory grows with the touched voxels only.
+  // null. Rays are taken in bands and f's input in batches, so memory grows with the touched
+  // voxels' colours and their gradients only.
   virtual AggregationResult Run(const LipschitzNetwork& network, const StyleRays& batch,
                                 std::vector<double>* gradient) = 0;
 
@@ -130,11 +139,15 @@ class GradientAggregation : public StyleLoss {
   struct Band;
 
   void March(const StyleRays& batch, int64_t begin, int64_t end, Band* band);
-  void FillTouchedFeatures(float position_scale);
+  void FillTouchedFeatures(float position_scale, int64_t begin, int64_t count);
+  // body(first slot, slots), one after the other, with features_ of these.
+  template <typename Body>
+  void ForEachBatch(float position_scale, const Body& body);
   void RenderColors(const StyleRays& batch, Band* band) const;
   void Scatter(const StyleRays& batch, const Band& band);
-  // Behind Scatter: EQ(view-penalty) times 3 Q. Adds its gradient, and clears the masses.
-  double AddViewPenalty(const LipschitzNetworkData& data);
+  // Behind Scatter, of a batch: EQ(view-penalty) times 3 Q. Adds its gradient, and clears the
+  // masses.
+  double AddViewPenalty(const LipschitzNetworkData& data, int64_t begin, int64_t count);
   bool Counts(const StyleRays& batch, const Band& band, int64_t ray) const;
   void ForgetTouched();
 
@@ -150,7 +163,8 @@ class GradientAggregation : public StyleLoss {
   // Of points, see CornerPoints: voxels, and then the texels of background spheres.
   std::vector<int32_t> slot_of_point_;  // -1 between runs
   std::vector<int32_t> touched_;        // point of slot
-  Buffer<float> features_, sh_, d_sh_;  // [slots, row_.stride()]
+  Buffer<float> sh_, d_sh_;             // [slots, row_.stride()]
+  Buffer<float> features_;              // [slots of a batch, row_.stride()]
 };
 
 }  // namespace regrade

@@ -5,6 +5,7 @@
 #include <utility>
 #include <vector>
 
+#include "kernels/base/parallel_tasks.h"
 #include "kernels/base/random.h"
 #include "stylize/spectral_norm.h"
 
@@ -122,9 +123,10 @@ LocalLipschitz MeasureLocalLipschitz(const LipschitzNetwork& network,
     return point;
   };
 
-  constexpr int64_t kChunk = 1000;
-  for (int64_t begin = 0; begin < options.pairs; begin += kChunk) {
-    const int64_t count = std::min(kChunk, options.pairs - begin);
+  constexpr int64_t kChunk = 500;
+  std::vector<double> pairs(static_cast<size_t>((options.pairs + kChunk - 1) / kChunk));
+  ParallelTasks(0, std::ssize(pairs), [&](int64_t chunk) {
+    const int64_t begin = chunk * kChunk, count = std::min(kChunk, options.pairs - begin);
     MatrixXd a(inputs, count), b(inputs, count);
     for (int64_t i = 0; i < count; ++i) {
       a.col(i) = point_of(1, begin + i);
@@ -133,17 +135,20 @@ LocalLipschitz MeasureLocalLipschitz(const LipschitzNetwork& network,
     const MatrixXd difference = f.Forward(a) - f.Forward(b);
     for (int64_t i = 0; i < count; ++i) {
       const double distance = (a.col(i) - b.col(i)).norm();
+      double& steepest = pairs[static_cast<size_t>(chunk)];
       if (distance >= options.min_distance)
-        result.pairs = std::max(result.pairs, difference.col(i).norm() / distance);
+        steepest = std::max(steepest, difference.col(i).norm() / distance);
     }
-  }
+  });
+  for (const double steepest : pairs) result.pairs = std::max(result.pairs, steepest);
 
-  std::vector<std::pair<double, VectorXd>> steepest;
-  for (int64_t i = 0; i < options.jacobians; ++i) {
+  std::vector<std::pair<double, VectorXd>> steepest(static_cast<size_t>(options.jacobians));
+  ParallelTasks(0, options.jacobians, [&](int64_t i) {
     const VectorXd point = point_of(3, i);
     VectorXd direction = VectorXd::Ones(inputs).normalized();
-    steepest.emplace_back(f.NormAt(point, &direction), point);
-  }
+    const double norm = f.NormAt(point, &direction);
+    steepest[static_cast<size_t>(i)] = {norm, point};
+  });
   std::ranges::sort(steepest, [](const auto& a, const auto& b) { return a.first > b.first; });
   if (!steepest.empty()) {
     result.jacobians = steepest.front().first;

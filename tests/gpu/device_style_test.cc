@@ -167,7 +167,9 @@ void CheckLossAndGradient(int side, Scene scene) {
                                        .max_transmittance = 0.9f,
                                        .one_sided = true,
                                        .view_weight = 0.7,
-                                       .every_voxel = every_voxel};
+                                       .divide_by_voxels = every_voxel,
+                                       .every_voxel = every_voxel,
+                                       .batch = every_voxel ? 1 << 20 : 100};
       GradientAggregation on_cpu(field, options);
       const std::unique_ptr<StyleLoss> on_device = MakeDeviceStyleLoss(&on_card, options);
       const size_t size = static_cast<size_t>(network.NumParameters());

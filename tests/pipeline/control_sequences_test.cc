@@ -149,7 +149,8 @@ struct ExposedViews {
 TEST(FrameGains, TheLinearMapsFieldIsComparedInTheFramesExposures) {
   const ExposedViews v;
   const auto psnr = [&v](const PhotoGains& gains) {
-    return *LinearMapPsnr(v.stored.field, v.cameras, v.source, v.views_2d, {}, gains, {});
+    return *LinearMapPsnr(v.stored.field, v.cameras, v.source, v.views_2d, {}, gains,
+                          Backend::kCpu, {});
   };
   EXPECT_GT(psnr(v.gains), 50);
   EXPECT_LT(psnr({}), 25);

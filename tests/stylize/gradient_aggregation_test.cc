@@ -200,6 +200,24 @@ TEST(GradientAggregation, EveryVoxelGivesTheSameGradient) {
   EXPECT_LE(RelativeDifference(all, touched), 1e-6);
 }
 
+TEST(GradientAggregation, BatchesGiveTheSameGradient) {
+  const RadianceField field = Ball(10);
+  const StyleRays batch = SomeRays(2, 9);
+  const LipschitzNetwork network = RandomNetwork(97);
+  std::vector<double> whole = NoGradient(), parts = NoGradient();
+  GradientAggregation at_once(field, {.view_weight = 0.7}),
+      in_batches(field, {.view_weight = 0.7, .batch = 37});
+  const AggregationResult one = at_once.Run(network, batch, &whole),
+                          several = in_batches.Run(network, batch, &parts);
+  EXPECT_GT(one.touched_voxels, 4 * 37);
+  EXPECT_NEAR(several.loss, one.loss, 1e-12);
+  EXPECT_LE(RelativeDifference(parts, whole), 1e-6);
+  const StyleLoss::HiddenSums all = at_once.SumHidden(network, batch),
+                              some = in_batches.SumHidden(network, batch);
+  EXPECT_EQ(all.hidden, some.hidden);
+  EXPECT_EQ(all.missing, some.missing);
+}
+
 // By all that the network maps, the texels of the background among it.
 TEST(GradientAggregation, PaperSumDividesByPoints) {
   RadianceField field = Ball(8);
