@@ -58,12 +58,20 @@ function(regrade_batches name)
   endif()
 endfunction()
 
-# regrade_library(name SOURCES... [LINK libs...]): a static library; its .cu files are C++ when CUDA is off.
+# Sources compile in two thirds of the time: those of tests, and those that call others and wait for none of their own
+# loops.
+set(regrade_quick_options $<$<CONFIG:Release>:-O1>)
+
+# regrade_library(name [QUICK] SOURCES... [LINK libs...]): a static library; its .cu files are C++ when CUDA is off.
+# QUICK: with regrade_quick_options.
 function(regrade_library name)
-  cmake_parse_arguments(ARG "" "" "SOURCES;LINK" ${ARGN})
+  cmake_parse_arguments(ARG "QUICK" "" "SOURCES;LINK" ${ARGN})
   add_library(${name} STATIC ${ARG_SOURCES})
   set_property(GLOBAL APPEND PROPERTY REGRADE_LIBRARIES ${name})
   target_link_libraries(${name} PUBLIC regrade_flags ${ARG_LINK})
+  if(ARG_QUICK)
+    target_compile_options(${name} PRIVATE ${regrade_quick_options})
+  endif()
   regrade_batches(${name})
   if(NOT REGRADE_CUDA_FOUND)
     foreach(source ${ARG_SOURCES})
@@ -94,9 +102,6 @@ function(regrade_instruction_sets name stem)
   endif()
 endfunction()
 
-# Sources of tests compile in two thirds of the time, and what they call is in libraries.
-set(regrade_test_options $<$<CONFIG:Release>:-O1>)
-
 # regrade_test(name SOURCES... LINK libs... [PARTS n] [COST seconds]): one GoogleTest program, one CTest test: to start a
 # program takes longer than most cases. With PARTS n, for long programs, it is n tests, NAME_1 to
 # NAME_n, which share the cases; the costly begin first.
@@ -104,7 +109,7 @@ function(regrade_test name)
   cmake_parse_arguments(ARG "" "COST;PARTS" "SOURCES;LINK" ${ARGN})
   add_executable(${name} ${ARG_SOURCES})
   target_link_libraries(${name} PRIVATE regrade_flags source_dir ${ARG_LINK} GTest::gtest GTest::gtest_main)
-  target_compile_options(${name} PRIVATE ${regrade_test_options})
+  target_compile_options(${name} PRIVATE ${regrade_quick_options})
   regrade_batches(${name})
   if(REGRADE_BATCHES)
     target_precompile_headers(${name} REUSE_FROM regrade_precompiled)

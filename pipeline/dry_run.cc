@@ -107,9 +107,11 @@ std::vector<StageEstimate> ExpectedStages(RunContext* context) {
   std::vector<StageEstimate> stages = EstimateStages(
       settings, size, ChooseBackend(settings.run.device, settings.run.reproducible),
       omp_get_max_threads());
-  if (const auto read_seconds = SourceOf(*context).read_seconds)
-    for (StageEstimate& stage : stages)
-      if (stage.stage == "reconstruct") stage.seconds = *read_seconds, stage.memory = 0;
+  if (const auto read_seconds = SourceOf(*context).read_seconds)  // no fit says how large it is
+    for (StageEstimate& stage : stages) {
+      stage.memory = 0;
+      if (stage.stage == "reconstruct") stage.seconds = *read_seconds;
+    }
   if (!posed) return stages;
   const double pace = MeasuredPace(stages, MeasuredStages(*context->workspace));
   for (StageEstimate& stage : stages) stage.seconds *= pace;

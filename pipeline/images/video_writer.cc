@@ -45,6 +45,22 @@ uint8_t Byte(float value) {  // as in our PNG files
   return value > 0 ? static_cast<uint8_t>(std::min(value, 1.f) * 255.f + 0.5f) : 0;
 }
 
+Image InColor(const Image& picture) {
+  if (picture.channels == 3) return picture;
+  Image color(picture.width, picture.height);
+  for (size_t i = 0; i < color.pixels.size(); ++i) color.pixels[i] = picture.pixels[i / 3];
+  return color;
+}
+
+// The bytes of an RGB picture with its last column and row repeated up to `width` x `height`.
+void PutBytes(const Image& picture, int width, int height, uint8_t* to) {
+  for (int y = 0; y < height; ++y) {
+    const float* const row = picture.at(0, std::min(y, picture.height - 1));
+    for (int i = 0; i < 3 * picture.width; ++i) *to++ = Byte(row[i]);
+    for (int x = picture.width; x < width; ++x, to += 3) std::copy_n(to - 3, 3, to);
+  }
+}
+
 }  // namespace
 
 struct VideoWriter::State {
@@ -176,14 +192,10 @@ void VideoWriter::Add(const Image& frame) {
   State& s = *state_;
   REGRADE_CHECK_EQ(frame.width, s.width);
   REGRADE_CHECK_EQ(frame.height, s.height);
-  const Image picture = CompositeOnWhite(frame);
-  const bool grey = picture.channels == 1;
-  uint8_t* to = s.rgb.data();
-  for (int y = 0; y < s.yuv->height; ++y)
-    for (int x = 0; x < s.yuv->width; ++x) {
-      const float* from = picture.at(std::min(x, s.width - 1), std::min(y, s.height - 1));
-      for (int c = 0; c < 3; ++c) *to++ = Byte(from[grey ? 0 : c]);
-    }
+  if (frame.channels == 3)
+    PutBytes(frame, s.yuv->width, s.yuv->height, s.rgb.data());
+  else
+    PutBytes(InColor(CompositeOnWhite(frame)), s.yuv->width, s.yuv->height, s.rgb.data());
   const uint8_t* const rows[] = {s.rgb.data()};
   const int stride[] = {3 * s.yuv->width};
   s.CheckEncoder(av_frame_make_writable(s.yuv.get()), "allocate a frame");

@@ -8,6 +8,7 @@
 #include "kernels/field/spherical_harmonics.h"
 #include "pipeline/files/text.h"
 #include "reconstruct/fit/resample_grid.h"
+#include "stylize/field/network_row.h"
 
 namespace regrade {
 namespace {
@@ -158,11 +159,30 @@ StagePlan PlanTracks(int64_t photos, int threads) {
   return {0, SecondsWith(kTrackSecondsPerPhoto * static_cast<double>(photos), threads)};
 }
 
-StagePlan PlanStyle(const TrainNetworkOptions& options, double view_pixels, int threads) {
+PlannedField PlanField(const FitOptions& options, const SceneBox& box) {
+  const size_t last = options.resolutions.size() - 1;
+  return {PlannedVoxels(options, box, last), VerticesOf(options, box, last),
+          BasisOfDegree(options.sh_degree)};
+}
+
+PlannedField PlanField(const SplatFitOptions& options) {
+  return {1000.0 * double{options.thousands}, 0, BasisOfDegree(options.sh_degree)};
+}
+
+StagePlan PlanStyle(const TrainNetworkOptions& options, const PlannedField& field,
+                    double view_pixels, double photos, int threads) {
+  constexpr double kTouchedByRay = 250, kTargetBytes = 12;
   const double rays = options.rays_per_step > 0 ? options.rays_per_step : view_pixels;
   const double step =
       kStyleSecondsPerStep * std::pow(std::max(1.0, rays / kStyleRateRays), kStyleRateGrowth);
-  return {0, SecondsWith(step * options.steps, threads)};
+  const double row = 4.0 * RowOf(field.basis).stride(),
+               touched = std::min(field.records, kTouchedByRay * rays),
+               batch = std::min(touched, static_cast<double>(options.loss.batch));
+  const double bytes = field.records * (4.0 * RecordLanes(field.basis) + 2 * kIndexBytes) +
+                       field.vertices * kGridBytes + row * (2 * touched + batch) +
+                       kTargetBytes * view_pixels * photos;
+  return {static_cast<uint64_t>(kProgramBytes + bytes),
+          SecondsWith(step * options.steps, threads)};
 }
 
 std::string PlanText(const StagePlan& plan) {

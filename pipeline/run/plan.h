@@ -69,9 +69,20 @@ bool LowerSplatsToMemory(const std::function<StagePlan(const SplatFitOptions&)>&
                          uint64_t limit, SplatFitOptions* options);
 StagePlan PlanPoses(int64_t photos, int threads);
 StagePlan PlanTracks(int64_t photos, int threads);
-// `view_pixels`: of a photo at working size, which are a step's rays where rays_per_step is 0.
-// More rays share voxels, so that time grows by their number to the power kStyleRateGrowth.
-StagePlan PlanStyle(const TrainNetworkOptions& options, double view_pixels, int threads);
+// What a fit stores: records of voxels or splats, and the vertices of the grid that links to
+// them.
+struct PlannedField {
+  double records = 0, vertices = 0;
+  int basis = 1;
+};
+PlannedField PlanField(const FitOptions& options, const SceneBox& box);
+PlannedField PlanField(const SplatFitOptions& options);
+// `view_pixels`: of each of `photos` at working size, which are a step's rays where
+// rays_per_step is 0. More rays share voxels, so that time grows by their number to the power
+// kStyleRateGrowth. In memory are the field, the photos' targets, and of what a step's rays
+// touch the colours, their gradients, and a batch of features.
+StagePlan PlanStyle(const TrainNetworkOptions& options, const PlannedField& field,
+                    double view_pixels, double photos, int threads);
 
 // "about 1.8 GB of memory and 4 min 12 s"
 std::string PlanText(const StagePlan& plan);

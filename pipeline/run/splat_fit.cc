@@ -94,6 +94,10 @@ StagePlan PlanSplats(const RunSettings& settings, const FitPlace& place) {
   return PlanSplatsAt(place, AtMostOfPixels(settings.splats, place));
 }
 
+PlannedField PlannedSplatField(const RunSettings& settings, const FitPlace& place) {
+  return PlanField(AtMostOfPixels(settings.splats, place));
+}
+
 std::string LoweredSplats(const RunSettings& settings, const FitPlace& place) {
   return SplatsWithinMemory(settings.splats, place).notice;
 }
@@ -128,6 +132,7 @@ const FitKind kSplatFit{.name = "splats",
                         .sh_degree = DegreeOfSplats,
                         .check = CheckSplatSettings,
                         .plan = PlanSplats,
+                        .field = PlannedSplatField,
                         .lowered = LoweredSplats,
                         .work = PlannedSeconds,
                         .measured = MeasuredOfSplats,

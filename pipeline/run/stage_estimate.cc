@@ -34,9 +34,8 @@ double PoseSeconds(const CaptureSize& size, int threads) {
   return decode + (size.lacks_points ? PlanTracks(size.photos, threads).seconds : 0);
 }
 
-StagePlan FitPlan(const RunSettings& settings, const CaptureSize& size, Backend backend) {
-  return FitKindOf(settings).plan(
-      settings, {backend, PixelsToFit(settings, size), PhotosToFit(settings, size)});
+FitPlace PlaceOf(const RunSettings& settings, const CaptureSize& size, Backend backend) {
+  return {backend, PixelsToFit(settings, size), PhotosToFit(settings, size)};
 }
 
 double RenderSeconds(const RunSettings& settings, const CaptureSize& size) {
@@ -102,16 +101,19 @@ std::vector<StageEstimate> EstimateStages(const RunSettings& settings, const Cap
   const double on_card = backend == Backend::kCuda ? kFasterOnCard : 1;
   const double photo = Megapixels(size, settings.scene.photo_size),
                photos = static_cast<double>(size.photos);
-  const StagePlan fit = FitPlan(settings, size, backend);
-  double stylize = PlanStyle(settings.network, 1e6 * photo, threads).seconds;
+  const FitPlace place = PlaceOf(settings, size, backend);
+  const FitKind& kind = FitKindOf(settings);
+  const StagePlan fit = kind.plan(settings, place);
+  StagePlan stylize =
+      PlanStyle(settings.network, kind.field(settings, place), 1e6 * photo, photos, threads);
   if (settings.residual.On())
-    stylize += Scaled(kOfResidual * kExactFrame * photos * photo, threads);
+    stylize.seconds += Scaled(kOfResidual * kExactFrame * photos * photo, threads);
   return {
       {"pose", PoseSeconds(size, threads)},
       {"reconstruct", kAroundFit * fit.seconds, fit.memory},
       {"style_2d",
        Scaled(photos * (kDecode * Megapixels(size, 1 << 20) + kStyle2d * photo), threads)},
-      {"stylize", on_card * stylize},
+      {"stylize", on_card * stylize.seconds, stylize.memory},
       {"render", on_card * Scaled(RenderSeconds(settings, size), threads)},
       {"evaluate", Scaled(EvaluateSeconds(settings, size), threads)},
       {"report", Scaled(kReport + PageSeconds(settings), threads)},

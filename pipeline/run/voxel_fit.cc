@@ -102,6 +102,10 @@ StagePlan PlanVoxels(const RunSettings& settings, const FitPlace& place) {
   return PlanFitAt(place, AdaptedTo(settings.fit, place));
 }
 
+PlannedField PlannedGrid(const RunSettings& settings, const FitPlace& place) {
+  return PlanField(AdaptedTo(settings.fit, place), place.box);
+}
+
 std::string LoweredVoxels(const RunSettings& settings, const FitPlace& place) {
   return FitWithinMemory(AdaptedTo(settings.fit, place), place).notice;
 }
@@ -151,6 +155,7 @@ const FitKind kVoxelFit{.name = "voxels",
                         .sh_degree = DegreeOfVoxels,
                         .check = CheckVoxelSettings,
                         .plan = PlanVoxels,
+                        .field = PlannedGrid,
                         .lowered = LoweredVoxels,
                         .work = RayVoxels,
                         .measured = MeasuredOfVoxels,

@@ -39,6 +39,7 @@
 #include "pipeline/stages/stages.h"
 #include "pipeline/stages/style_pictures.h"
 #include "pipeline/stages/styled_field.h"
+#include "pipeline/stages/view_controls.h"
 #include "pipeline/workspace/metrics_json.h"
 #include "pipeline/workspace/output_names.h"
 
@@ -58,31 +59,6 @@ FrameSource FramesOf(const KeptPictures& kept, const std::string& folder,
 void Append(std::vector<NamedFrameSource> more, std::vector<NamedFrameSource>* sequences) {
   std::ranges::move(more, std::back_inserter(*sequences));
 }
-
-// What bounds the table of the frames at the photos' places. Frames with another camera than
-// the photos are not compared with them.
-struct ViewControls {
-  const WorkingViews* views;
-  bool one_map;
-  const Image* style;
-  std::function<Image(int)> photo_2d;
-
-  std::vector<NamedFrameSource> Of(const std::vector<int>& of, const FrameSource& unstyled,
-                                   const FrameSource& views_2d, const FrameSource& styled,
-                                   bool with_photos) const {
-    std::vector<NamedFrameSource> controls =
-        ControlSequences({unstyled, styled, views_2d, style, one_map});
-    if (!with_photos) return controls;
-    const int count = static_cast<int>(of.size());
-    controls.push_back({"photos", {count, [this, of](int k) {
-                                     Image photo = views->Photo(of[k]);
-                                     views->LeaveOutMasked(of[k], &photo);
-                                     return photo;
-                                   }}});
-    controls.push_back({"photos_2d", {count, [this, of](int k) { return photo_2d(of[k]); }}});
-    return controls;
-  }
-};
 
 // Depth at each camera, rendered on demand.
 GeometrySource GeometryOf(const RadianceField& field, const std::vector<Camera>& cameras) {

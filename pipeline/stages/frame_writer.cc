@@ -26,24 +26,21 @@ void FrameWriter::Write(const std::shared_ptr<const Frame>& frame, const FrameSe
     WritePng8(workspace_.NewPath("frames/" + prefix + sequence + "/" + FrameName(index)),
               image);
   };
-  before_.Do([=] {
-    write("source", frame->source);
+  source_.Do([=] { write("source", frame->source); });
+  styled_.Do([=] { write("styled", frame->styled); });
+  if (frame->views_2d) views_2d_.Do([=] { write("views_2d", *frame->views_2d); });
+  grey_.Do([=] {
     // Fidelity, which is not measured on the common camera's frames, ignores pixels of high
     // transmittance, and those that an edit says nothing about.
     if (prefix == kCommonPrefix) return;
     write("transmittance", frame->transmittance);
     if (!frame->edited.empty()) write(kEditedFrames, frame->edited);
   });
-  after_.Do([=] {
-    write("styled", frame->styled);
-    if (frame->views_2d) write("views_2d", *frame->views_2d);
-  });
 }
 
 void FrameWriter::Finish() {
-  before_.Finish();
-  after_.Finish();
-  film_.Finish();
+  for (OrderedWorker* worker : {&source_, &styled_, &views_2d_, &grey_, &film_})
+    worker->Finish();
 }
 
 }  // namespace regrade

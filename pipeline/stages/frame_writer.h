@@ -26,8 +26,8 @@ struct Frame {
   Image edited;                   // where views_2d has an edit, see CarriedEdit; or empty
 };
 
-// One thread for each half of the pictures and one for the films, so that a GPU does not wait
-// for them. Errors of the threads are thrown by Write or Finish.
+// A thread for each sequence of pictures and one for the films, so that a GPU does not wait for
+// them. Errors of the threads are thrown by Write or Finish.
 class FrameWriter {
  public:
   FrameWriter(const Workspace& workspace, const Vignette& vignette, RunFilms* films)
@@ -47,7 +47,7 @@ class FrameWriter {
   const Workspace& workspace_;
   const Vignette vignette_;
   RunFilms* films_;
-  OrderedWorker before_, after_, film_;
+  OrderedWorker source_, styled_, views_2d_, grey_, film_;
 };
 
 }  // namespace regrade

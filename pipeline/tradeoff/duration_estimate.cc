@@ -74,8 +74,8 @@ double DurationEstimate::Rough(const Variant& variant) const {
   if (variant.benchmark == "fit")
     return FitKindOf(settings).plan(settings, place_of_(settings)).seconds;
   if (variant.benchmark == "style")
-    return PlanStyle(settings.network,
-                     0.75 * settings.scene.photo_size * settings.scene.photo_size,
+    return PlanStyle(settings.network, {},
+                     0.75 * settings.scene.photo_size * settings.scene.photo_size, 0,
                      omp_get_max_threads())
         .seconds;
   return variant.benchmark == "poses" ? kPoses : kFewSeconds;
