@@ -17,4 +17,4 @@ export ASAN_OPTIONS=allocator_may_return_null=1:detect_stack_use_after_return=0 
 export LSAN_OPTIONS=suppressions=$root/tests/support/leaks.supp,print_suppressions=0
 # Threads that wait would take the cores of the test beside them.
 export OMP_WAIT_POLICY=passive
-ctest --test-dir build/sanitize --output-on-failure --no-tests=error -j2 -R "^($(IFS='|' && echo "$*"))\$"
+ctest --test-dir build/sanitize --output-on-failure --no-tests=error -j2 -R "^($(IFS='|' && echo "$*"))(_[0-9]+)?\$"

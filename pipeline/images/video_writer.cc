@@ -66,6 +66,7 @@ void PutBytes(const Image& picture, int width, int height, uint8_t* to) {
 struct VideoWriter::State {
   std::string path, temporary;
   int width, height;         // of the frames
+  double frames_per_second;
   int64_t frames = 0;        // given to the encoder
   std::vector<uint8_t> rgb;  // a frame at the even size
   Output output;
@@ -93,7 +94,7 @@ struct VideoWriter::State {
                           "free some space, then run the same command again");
   }
 
-  void OpenEncoder(double frames_per_second) {
+  void OpenEncoder() {
     const AVCodec* codec = avcodec_find_encoder_by_name("libx264");
     if (codec == nullptr)
       throw ProgramError("no H.264 encoder", path,
@@ -104,6 +105,7 @@ struct VideoWriter::State {
     encoder->framerate = av_d2q(frames_per_second, 100000);
     encoder->time_base = av_inv_q(encoder->framerate);
     encoder->pix_fmt = AV_PIX_FMT_YUV420P;
+    encoder->gop_size = kFilmGroup;
     encoder->color_range = AVCOL_RANGE_MPEG;
     encoder->colorspace = AVCOL_SPC_BT709;
     encoder->color_primaries = AVCOL_PRI_BT709;
@@ -173,6 +175,7 @@ VideoWriter::VideoWriter(const std::string& path, int width, int height,
   s.path = path;
   s.width = width;
   s.height = height;
+  s.frames_per_second = frames_per_second;
   s.temporary = path + kTemporarySuffix;
   AVFormatContext* output = nullptr;
   // The muxer opens the file by this name again to move the index to the front.
@@ -181,7 +184,7 @@ VideoWriter::VideoWriter(const std::string& path, int width, int height,
   s.output.reset(output);
   s.CheckEncoder(code, "make an MP4 file");
   s.output->flags |= AVFMT_FLAG_BITEXACT;  // no dates, no version
-  s.OpenEncoder(frames_per_second);
+  s.OpenEncoder();
   s.OpenScaler();
   s.OpenFile();
 }
@@ -200,6 +203,10 @@ void VideoWriter::Add(const Image& frame) {
   const int stride[] = {3 * s.yuv->width};
   s.CheckEncoder(av_frame_make_writable(s.yuv.get()), "allocate a frame");
   sws_scale(s.scaler.get(), rows, stride, 0, s.yuv->height, s.yuv->data, s.yuv->linesize);
+  if (s.frames > 0 && s.frames % kFilmGroup == 0) {
+    s.Encode(nullptr);
+    s.OpenEncoder();
+  }
   s.yuv->pts = s.frames++;
   s.Encode(s.yuv.get());
 }

@@ -11,6 +11,10 @@ namespace regrade {
 // x264's constant rate factor: 0 is lossless, 51 the worst; at 18 most people see no loss.
 inline constexpr int kVideoCrf = 18;
 
+// A film is encoded in groups of so many frames, each by an encoder of its own: the bytes of a
+// group depend on its frames alone, and players jump to its first one.
+inline constexpr int kFilmGroup = 48;
+
 // Frames go to a temporary beside `path`; `path` appears only with Finish(). A writer that is
 // destroyed before leaves nothing. Colours are 4:2:0 with BT.709's matrix, and the file is
 // marked so; its index comes first. H.264 needs even sizes: the last column or row is repeated

@@ -53,6 +53,28 @@ TEST(VideoFile, MovieHasItsIndexFirstAndAllFrames) {
   EXPECT_EQ(std::distance(std::filesystem::directory_iterator(scratch.path()), {}), 1);
 }
 
+// Whole groups, and last ones of any length; a frame changes its own group alone.
+TEST(VideoFile, GroupsAreEncodedByThemselves) {
+  const ScratchFolder scratch;
+  const auto film = [&](int first, int last, int changed) {
+    const std::string path = scratch / "film.mp4";
+    VideoWriter writer(path, 64, 48, 30);
+    for (int i = first; i < last; ++i) writer.Add(Photo(64, 48, i == changed ? 1000 : i));
+    writer.Finish();
+    EXPECT_EQ(CountVideoFrames(path), last - first);
+    return ReadBytes(path);
+  };
+  for (const int tail : {0, 1, 2, 3, 5}) film(0, kFilmGroup + tail, -1);
+  const int frames = 2 * kFilmGroup + 7;
+  const std::string one = film(0, frames, -1), other = film(0, frames, 10),
+                    rest = film(kFilmGroup, frames, -1);
+  const auto same = std::mismatch(one.rbegin(), one.rend(), other.rbegin(), other.rend());
+  const size_t pictures = rest.size() - rest.rfind("mdat") - 4;
+  EXPECT_GE(static_cast<size_t>(same.first - one.rbegin()), pictures);
+  EXPECT_EQ(one.substr(one.size() - pictures), rest.substr(rest.size() - pictures));
+  EXPECT_NE(one, other);
+}
+
 TEST(VideoFile, OddSizesAndOtherChannelsAreTaken) {
   const ScratchFolder scratch;
   for (const int channels : {1, 3, 4}) {
