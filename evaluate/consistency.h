@@ -59,7 +59,8 @@ struct ConsistencyOptions {
          {.help = "what a pair's squared error is divided by: the colour channels of the "
                   "compared pixels, or those pixels, which is 4.77 dB lower; not of mode "
                   "stylegaussian",
-          .choices = "channel|pixel"});
+          .choices = "channel|pixel",
+          .constant = true});
     bind("lpips", lpips,
          {.help = "ONNX file of a perceptual distance network (LPIPS), with the inputs of "
                   "--flow onnx:FILE; compares each sequence with the 2D method's frames",
@@ -69,17 +70,20 @@ struct ConsistencyOptions {
         {.help = "compares edges with the unstyled frames' by SSIM: gradient, or the ONNX file "
                  "of an edge network with one input, RGB from -1 to 1, and one output [1, 1, "
                  "height, width] from 0 to 1",
-         .runs = "*|!gradient"});
+         .runs = "*|!gradient",
+         .constant = true});
     bind("style-features", style_features,
          {.help = "ONNX file of a network with one input, RGB from -1 to 1, whose outputs [1, "
                   "channels, ...] are features (VGG's): distances of Gram matrices and of "
                   "Fréchet to the style picture, and with --lpips a number like ArtFID",
-          .runs = "*"});
+          .runs = "*",
+          .constant = true});
     bind("style-embedding", style_embedding,
          {.help = "ONNX file of a network with one input [1, 3, 224, 224], RGB from -1 to 1, "
                   "whose output is a picture's vector (CLIP's): 1 - cosine to the style "
                   "picture's",
-          .runs = "*"});
+          .runs = "*",
+          .constant = true});
     bind(
         "min-coverage", min_coverage,
         {.unit = "fraction of pixels",

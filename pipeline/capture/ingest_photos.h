@@ -35,7 +35,8 @@ struct IngestOptions {
          {.unit = "megapixels",
           .help = "leaves larger photos out; reading one needs 16 bytes a pixel",
           .min = 1,
-          .max = 1000});
+          .max = 1000,
+          .constant = true});
     bind("video-frames", video_frames,
          {.unit = "frames",
           .help = "frames to pick of all films together; 0 picks 40 to 120, by how far the "

@@ -109,7 +109,7 @@ struct FilmDecoder::State {
         square * static_cast<double>(height) > static_cast<double>(limits.max_pixels))
       Refuse(Concat("frames of ", width, " x ", height, " pixels, more than the limit of ",
                     limits.max_pixels / 1'000'000, " megapixels"),
-             "scale it down or raise --max-megapixels");
+             "scale it down or raise max-megapixels by --config");
     square_width = static_cast<int>(std::lround(square));
     info.orientation = OrientationOf(*stream);
     const bool turned = info.orientation >= 5;

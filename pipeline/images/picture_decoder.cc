@@ -36,7 +36,7 @@ void CheckSize(int64_t width, int64_t height, int64_t pixel_bytes, int64_t file_
   if (width > limits.max_pixels / height)
     throw InputError(
         Concat(size, ", more than the limit of ", limits.max_pixels / 1'000'000, " megapixels"),
-        where, "scale it down or raise --max-megapixels");
+        where, "scale it down or raise max-megapixels by --config");
   if (width * height * pixel_bytes > MostPixelsOf(file_bytes))
     throw InputError(
         Concat("the header claims ", size, ", but the file has only ", file_bytes, " bytes"),

@@ -46,7 +46,7 @@ std::string Absolute(const std::string& path) {
 
 const char* LikelyCause(const ChildResult& result) {
   if (result.TimedOut())
-    return "raise --pose-time-limit if there are many photos or the machine is slow";
+    return "raise pose-time-limit by --config if there are many photos or the machine is slow";
   if (result.signal == SIGKILL)
     return "the system killed it, probably because memory ran out: close other programs, or "
            "lower the constant pose-image-size (--config)";
@@ -92,7 +92,7 @@ ColmapProgram::ColmapProgram(const std::string& program, const std::string& log_
                        program, kInstall);
   if (gpu == "on" && !has_cuda)
     throw ProgramError("this COLMAP was built without CUDA", program,
-                       "use --colmap-gpu auto, or give a COLMAP with CUDA with --colmap PATH");
+                       "leave colmap-gpu at auto, or give a COLMAP with CUDA with --colmap PATH");
   use_gpu_ = gpu != "off" && has_cuda;
   may_fall_back_ = gpu == "auto";
 }

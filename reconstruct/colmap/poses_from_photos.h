@@ -31,7 +31,8 @@ struct PoseOptions {
     bind("colmap-gpu", colmap_gpu,
          {.help = "auto finds and matches features on a GPU where this COLMAP was built with "
                   "CUDA, and goes on with the CPU if that fails",
-          .choices = "auto|on|off"});
+          .choices = "auto|on|off",
+          .constant = true});
     bind("pose-image-size", image_size,
          {.unit = "pixels",
           .help = "longer side for feature extraction; 2000 takes about 4 times as long and "
@@ -58,7 +59,8 @@ struct PoseOptions {
          {.unit = "minutes",
           .help = "time limit for finding poses; 0 sets it by the number of photos",
           .min = 0,
-          .max = 1e6});
+          .max = 1e6,
+          .constant = true});
     bind("pose-quiet-limit", quiet_limit_min,
          {.unit = "minutes",
           .help = "stop COLMAP if it prints nothing for this long; 0 has no limit",

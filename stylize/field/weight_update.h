@@ -62,10 +62,10 @@ struct WeightUpdateOptions {
           .constant = true});
     bind("style-no-regularisation", no_regularisation,
          {.help = "ablation: no Lipschitz regularisation: closer to the 2D method, and noisier "
-                  "where its views disagree; only --style-bound limits the bound",
+                  "where its views disagree; only style-bound limits the bound",
           .constant = true});
     bind("style-spectral-normalisation", spectral_normalisation,
-         {.help = "ablation: every layer's norm is 1, or as much less as --style-bound asks; "
+         {.help = "ablation: every layer's norm is 1, or as much less as style-bound asks; "
                   "smoothest, and weakest in colour",
           .constant = true});
   }

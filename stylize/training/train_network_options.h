@@ -78,7 +78,8 @@ struct TrainNetworkOptions : WeightUpdateOptions {
     bind("style-bound", bound_factor,
          {.help = "largest certified Lipschitz bound, in units of K_est; 0 sets no limit",
           .min = 0,
-          .max = 1e6});
+          .max = 1e6,
+          .constant = true});
     bind("style-position-scale", position_scale,
          {.help = "how strongly the style may vary with position",
           .min = 0,

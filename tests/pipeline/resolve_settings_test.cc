@@ -79,7 +79,7 @@ TEST(ResolveSettings, ThePapersPresetEvaluatesByItsProtocol) {
   EXPECT_EQ(draft.mode, plain.mode);
   EXPECT_EQ(draft.warp, plain.warp);
   const ConsistencyOptions own =
-      Resolve({"--preset", "paper", "--warp", "later", "--error-per", "pixel"})
+      Resolve({"--preset", "paper", "--warp", "later", "--config", R"({"error-per": "pixel"})"})
           .settings.consistency;
   EXPECT_EQ(own.mode, "ruder2016");
   EXPECT_EQ(own.warp, "later");

@@ -102,7 +102,7 @@ TEST_F(Poses, ACardThatFailsIsReplacedByTheProcessor) {
   options_.colmap_gpu = "on";
   fs::remove_all(folder_ / "sparse");
   ExpectError("broken-gpu", ExitCode::kExternalProgram, {"feature_extractor failed"});
-  ExpectError("good", ExitCode::kExternalProgram, {"without CUDA", "--colmap-gpu auto"});
+  ExpectError("good", ExitCode::kExternalProgram, {"without CUDA", "colmap-gpu at auto"});
 }
 
 // Frames of a film are matched by the list, in batches, and have a camera of their own.
@@ -185,12 +185,12 @@ TEST_F(Poses, F49_KilledForMemoryIsTriedAgainWithOneThread) {
 
 TEST_F(Poses, F50_HangEndsAtTheLimits) {
   options_.quiet_limit_min = 0.5 / 60;
-  ExpectError("hang", ExitCode::kExternalProgram, {"printed nothing", "--pose-time-limit"});
+  ExpectError("hang", ExitCode::kExternalProgram, {"printed nothing", "pose-time-limit"});
 }
 
 TEST_F(Poses, F50_TimeLimit) {
   options_.time_limit_min = 2.0 / 60;
-  ExpectError("hang", ExitCode::kExternalProgram, {"time limit", "--pose-time-limit"});
+  ExpectError("hang", ExitCode::kExternalProgram, {"time limit", "pose-time-limit"});
 }
 
 TEST_F(Poses, F50_IgnoredSigtermIsFollowedBySigkill) {
