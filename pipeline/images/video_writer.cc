@@ -65,7 +65,7 @@ void PutBytes(const Image& picture, int width, int height, uint8_t* to) {
 
 struct VideoWriter::State {
   std::string path, temporary;
-  int width, height;         // of the frames
+  int width, height;  // of the frames
   double frames_per_second;
   int64_t frames = 0;        // given to the encoder
   std::vector<uint8_t> rgb;  // a frame at the even size

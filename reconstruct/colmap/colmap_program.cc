@@ -91,8 +91,9 @@ ColmapProgram::ColmapProgram(const std::string& program, const std::string& log_
     throw ProgramError("COLMAP " + version_ + " is too old (3.7 and newer are supported)",
                        program, kInstall);
   if (gpu == "on" && !has_cuda)
-    throw ProgramError("this COLMAP was built without CUDA", program,
-                       "leave colmap-gpu at auto, or give a COLMAP with CUDA with --colmap PATH");
+    throw ProgramError(
+        "this COLMAP was built without CUDA", program,
+        "leave colmap-gpu at auto, or give a COLMAP with CUDA with --colmap PATH");
   use_gpu_ = gpu != "off" && has_cuda;
   may_fall_back_ = gpu == "auto";
 }
