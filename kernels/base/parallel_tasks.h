@@ -41,21 +41,17 @@ inline int64_t TasksAtOnce(int64_t bytes_each) {
   return std::clamp<int64_t>(most, 1, 2 * std::max(1, omp_get_max_threads()));
 }
 
-// use(i, make(i)) for i in [0, count) in order, in this thread; a few are made at a time, in
-// parallel, of about `bytes_each`.
+// Calls use(i, make(i)) for i in [0, count) in order, in this thread; make is called for
+// several at once, as many as there are threads and fit into 256 MiB at `bytes_each`.
 template <typename Make, typename Use>
 void MakeAhead(int64_t count, int64_t bytes_each, const Make& make, const Use& use) {
-  std::vector<decltype(make(int64_t{0}))> made;
-  for (int64_t i = 0; i < count; ++i) {
-    const int64_t most = std::min(TasksAtOnce(bytes_each), int64_t{omp_get_max_threads()});
-    const int64_t at = i % most;
-    if (at == 0) {
-      made.clear();
-      made.resize(static_cast<size_t>(std::min(most, count - i)));
-      ParallelTasks(0, std::ssize(made),
-                    [&](int64_t k) { made[static_cast<size_t>(k)] = make(i + k); });
-    }
-    use(i, std::move(made[static_cast<size_t>(at)]));
+  const int64_t most = std::min(TasksAtOnce(bytes_each), int64_t{omp_get_max_threads()});
+  for (int64_t begin = 0; begin < count; begin += most) {
+    std::vector<decltype(make(begin))> made(static_cast<size_t>(std::min(most, count - begin)));
+    ParallelTasks(0, std::ssize(made),
+                  [&](int64_t k) { made[static_cast<size_t>(k)] = make(begin + k); });
+    for (int64_t k = 0; k < std::ssize(made); ++k)
+      use(begin + k, std::move(made[static_cast<size_t>(k)]));
   }
 }
 

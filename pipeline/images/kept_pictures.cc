@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <iterator>
 #include <map>
 #include <utility>
 #include <vector>
@@ -68,22 +69,24 @@ Image KeptPictures::Read(const std::string& path) const {
 }
 
 void KeptPictures::ReadAhead(const std::vector<std::string>& paths) const {
-  const int64_t count = std::ssize(paths);
-  for (int64_t begin = 0; begin < count && shared_->bytes_left > 0;) {
-    const int64_t end = std::min(count, begin + TasksAtOnce(0));
-    std::vector<Image> pictures(static_cast<size_t>(end - begin));
-    ParallelTasks(begin, end, [&](int64_t i) {
-      const std::string& path = paths[static_cast<size_t>(i)];
-      if (shared_->pictures.contains(path)) return;
+  std::vector<std::string> missing;
+  for (const std::string& path : paths)
+    if (!shared_->pictures.contains(path)) missing.push_back(path);
+  int64_t at_once = 1;  // the first one's size decides for the others
+  for (int64_t begin = 0; begin < std::ssize(missing) && shared_->bytes_left > 0;) {
+    std::vector<Image> pictures(
+        static_cast<size_t>(std::min(at_once, std::ssize(missing) - begin)));
+    ParallelTasks(0, std::ssize(pictures), [&](int64_t i) {
       try {
-        pictures[static_cast<size_t>(i - begin)] = Decode(path);
+        pictures[static_cast<size_t>(i)] = Decode(missing[static_cast<size_t>(begin + i)]);
       } catch (const Error&) {
       }
     });
-    for (; begin < end; ++begin)
-      if (Image& picture = pictures[pictures.size() - static_cast<size_t>(end - begin)];
-          !picture.empty())
-        Keep(paths[static_cast<size_t>(begin)], picture);
+    for (const Image& picture : pictures) {
+      if (!picture.empty()) Keep(missing[static_cast<size_t>(begin)], picture);
+      ++begin;
+    }
+    at_once = TasksAtOnce(std::ssize(pictures[0].pixels) * int64_t{sizeof(float)});
   }
 }
 

@@ -31,6 +31,7 @@ struct FitKind {
   void (*check)(const RunSettings& settings);
   // Before it is lowered to what memory holds.
   StagePlan (*plan)(const RunSettings& settings, const FitPlace& place);
+  // What it would store, likewise.
   PlannedField (*field)(const RunSettings& settings, const FitPlace& place);
   // What it is lowered to, or an empty text. Throws Error(kResources).
   std::string (*lowered)(const RunSettings& settings, const FitPlace& place);

@@ -39,6 +39,25 @@ TEST(KeptPictures, AreThoseOfTheFiles) {
   EXPECT_TRUE(copy.Read(folder / "fine.png").pixels == kept.Read(folder / "fine.png").pixels);
 }
 
+TEST(KeptPictures, AreReadAhead) {
+  const TemporaryFolder folder;
+  std::vector<std::string> paths;
+  std::vector<Image> pictures;
+  for (uint32_t i = 0; i < 5; ++i) {
+    paths.push_back(folder / (std::to_string(i) + ".png"));
+    WritePng8(paths.back(), testing::NoiseImage(20, 10, i));
+    pictures.push_back(ReadImage(paths.back()));
+  }
+  std::filesystem::remove(paths[0]);
+  const KeptPictures kept(KeptPictures::Origin::kOurs);
+  kept.ReadAhead(paths);
+  EXPECT_THROW(kept.Read(paths[0]), Error);
+  for (size_t i = 1; i < paths.size(); ++i) {
+    std::filesystem::remove(paths[i]);
+    EXPECT_EQ(kept.Read(paths[i]).pixels, pictures[i].pixels);
+  }
+}
+
 TEST(KeptPictures, BeyondTheLimitFilesAreReadAgain) {
   const TemporaryFolder folder;
   WriteText(folder / "a.png", EncodePng8(testing::NoiseImage(20, 10, 1)));
