@@ -27,9 +27,10 @@ cuda=${REGRADE_CUDA:-OFF}
 if [[ -z ${REGRADE_CUDA:-} ]] && command -v nvcc >/dev/null && nvidia-smi -L 2>/dev/null | grep -q GPU; then
   cuda=AUTO
 fi
-build=$root/build/cpu
-[[ $cuda == OFF ]] || build=$root/build/quickstart-cuda
-cmake -S "$root" -B "$build" -G Ninja -DCMAKE_BUILD_TYPE=Release -DREGRADE_CUDA="$cuda" >/dev/null
+build=$root/build/cpu batches=ON
+[[ $cuda == OFF ]] || build=$root/build/quickstart-cuda batches=OFF
+cmake -S "$root" -B "$build" -G Ninja -DCMAKE_BUILD_TYPE=Release -DREGRADE_CUDA="$cuda" -DREGRADE_BATCHES=$batches \
+  >/dev/null
 cmake --build "$build" --target regrade --parallel "$(nproc)"
 regrade=$build/pipeline/regrade
 
