@@ -12,6 +12,7 @@
 #include "pipeline/report/records.h"
 #include "pipeline/report/requirement_results.h"
 #include "pipeline/run/run_file.h"
+#include "pipeline/stages/render_parts.h"
 #include "pipeline/stages/run_facts.h"
 #include "pipeline/stages/stages.h"
 #include "pipeline/workspace/folder_size.h"
@@ -142,7 +143,13 @@ std::vector<CheckedRequirement> RunStyle(const std::string& first, const std::st
   context->style = &workspace;
   // From its beginning on the folder belongs to this picture.
   if (!std::filesystem::exists(workspace.Path("run.json"))) WriteRunFile("run", *context);
+  // Before anything that is there is given up.
+  if (context->parts.join)
+    if (const Stage stage = RenderStage(context);
+        workspace.Status(stage.name, stage.inputs).state != StageState::kDone)
+      RequireParts(stage, *context);
   RunPipeline(first, until, context, styles_after);
+  if (context->parts.join && !settings.start.dry_run) DropParts(*context);
   std::vector<CheckedRequirement> checked;
   if (!settings.start.dry_run) {
     WriteRunFile("run", *context);
@@ -192,6 +199,21 @@ void RunStyles(const std::string& first, const std::vector<NamedStyle>& styles,
   if (start.dry_run) return SayPlan(*context);
   if (styles.size() > 1) console->Info("took " + DurationText(console->Seconds()) + " in all");
   FinishRequirements(checked, start.junit, console);
+}
+
+void RunPart(const std::string& style, RunContext* context) {
+  Workspace folder(StyleFolder(context->settings.run.out, style), Workspace::BesideOthers());
+  context->style = &folder;
+  context->settings.style.name = style;
+  const StageRunner runner(context->workspace, context->style, context->console);
+  for (const StageEntry* before = std::begin(kStages); before != Find("render"); ++before)
+    runner.Require(before->name, "regrade run");
+  const Stage stage = RenderStage(context);
+  if (folder.Status(stage.name, stage.inputs).state == StageState::kDone)
+    context->console->Info("render: done before");
+  else
+    RenderPart(stage, context);
+  context->style = nullptr;
 }
 
 }  // namespace regrade

@@ -23,4 +23,8 @@ bool RunPipeline(const std::string& first, const std::string& last, RunContext* 
 void RunStyles(const std::string& first, const std::vector<NamedStyle>& styles,
                RunContext* context);
 
+// The part context->parts.part of the frames and films of a style, whose folder other parts may
+// share: see RenderPart. The stages before must be done.
+void RunPart(const std::string& style, RunContext* context);
+
 }  // namespace regrade

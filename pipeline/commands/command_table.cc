@@ -28,8 +28,8 @@ const std::vector<Command>& AllCommands() {
       {"render", "DIR [OPTIONS] | DIR --path FILE.json [OPTIONS]",
        "renders and measures a styled scene again, or renders the film of a page's camera path",
        RunRender,
-       "still size format name strength path film-seconds film-size fps until device dry-run "
-       "verbose"},
+       "still size format name strength path film-seconds film-size fps part join until device "
+       "dry-run verbose"},
       {"mix", "DIR [NAME|STYLED.npz ...] --out FOLDER [OPTIONS]",
        "makes a film that blends from the unstyled scene into one or more styles", RunMix},
       {"contact-sheet", "DIR [NAME...] | DIR PICTURE... --out FILE.png [OPTIONS]",

@@ -12,9 +12,15 @@ void Continue(const std::string& folder, const Prepared& prepared,
               const std::vector<NamedStyle>& styles, const std::string& first,
               RunContext* context) {
   RunSettings& settings = context->settings;
+  const std::string& part = context->parts.part;
   if (!prepared.run_words.empty()) context->source = prepared.run_words[0];
   settings.run.out = AbsolutePath(folder);
   CheckTogether(settings);
+  if (!part.empty()) {
+    Workspace workspace(folder, Workspace::BesideOthers());
+    context->workspace = &workspace;
+    return RunPart(styles[0].name, context);
+  }
   Workspace workspace(folder, settings.start.break_lock);
   context->workspace = &workspace;
   context->console->OpenLog(workspace.Path(".regrade/log.txt"));
@@ -27,6 +33,7 @@ void ContinueStyle(const Command& command, const Arguments& arguments, const std
                    Console* console) {
   RunContext context;
   context.console = console;
+  if (first == "render") context.options.Add("Parts", &context.parts);
   context.settings.Bind(&context.options);
   const auto prepared =
       Prepare(command, arguments, {.continues_style = true}, &context.options);
@@ -36,6 +43,9 @@ void ContinueStyle(const Command& command, const Arguments& arguments, const std
   if (settings.style.pictures.size() > 1 && !settings.style.match.On())
     throw UsageError("continues one style", std::string("regrade ") + command.name,
                      "name it with --name");
+  if (context.parts.join && !context.parts.part.empty())
+    throw UsageError("goes without --part", "--join",
+                     "render every part first, then join them");
   ProbeStyles(&settings, console);
   const std::string given = context.options.Given("name").value_or("");
   Continue(folder, *prepared, {{ChosenStyle(folder, given), settings.style.pictures}}, first,

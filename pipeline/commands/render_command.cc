@@ -9,6 +9,7 @@
 #include "pipeline/files/text.h"
 #include "pipeline/images/still_file.h"
 #include "pipeline/program/device_choice.h"
+#include "pipeline/run/film_parts.h"
 #include "pipeline/run/run_settings.h"
 #include "pipeline/stages/mixed_film.h"
 #include "pipeline/stages/photo_vignette.h"
@@ -157,12 +158,15 @@ void RunRender(const Command& command, const Arguments& arguments, Console* cons
   if (!stills && !AsksForHelp(arguments))
     return ContinueStyle(command, arguments, "render", console);
   StillOptions still;
+  FilmParts parts;  // in the help
   RunSettings settings;
   OptionSet options;
   options.Add("Still", &still);
+  options.Add("Parts", &parts);
   settings.Bind(&options);
   const auto prepared = Prepare(command, arguments, {.continues_style = true}, &options);
   if (!prepared) return;
+  if (parts.On()) throw UsageError("goes without --part and --join", "--still");
   const std::string& folder = prepared->words[0];
   const std::string name = ChosenLearnedStyle(folder, options.Given("name").value_or(""));
   if (settings.start.dry_run) {

@@ -39,7 +39,8 @@ std::vector<std::string> EquivalentCommand(const RunContext& context) {
   const std::string& preset = context.settings.run.preset;
   const RunOptions& run = context.settings.run;
   ApplyPreset(preset, PrefersCard(run.device, run.reproducible), &plain);
-  const JsonValue before = plain_options.Values(), start = OptionValues(plain.start),
+  const JsonValue before = plain_options.Values(),
+                  start = OptionValues(plain.start, context.parts),
                   program = OptionValues(plain.program);
   std::vector<std::string> words = {"regrade", "run"};
   if (!context.source.empty()) words.push_back(context.source);

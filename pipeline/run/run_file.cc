@@ -121,7 +121,7 @@ JsonValue RunFileJson(const std::string& command, const RunContext& context) {
   if (!context.source.empty()) words.Append(context.source);
   JsonValue options = context.options.Values();
   // Options of one start are not repeated.
-  const JsonValue start = OptionValues(context.settings.start);
+  const JsonValue start = OptionValues(context.settings.start, context.parts);
   JsonValue kept = JsonValue::Object();
   for (const auto& [name, value] : options.AsObject())
     if (start.Find(name) == nullptr) kept[name] = value;

@@ -23,8 +23,9 @@ void FrameWriter::Write(const std::shared_ptr<const Frame>& frame, const FrameSe
   if (set.prefix == kFilmPrefix) return;
   const std::string prefix = set.prefix;
   const auto write = [this, prefix, index](const char* sequence, const Image& image) {
-    WritePng8(workspace_.NewPath("frames/" + prefix + sequence + "/" + FrameName(index)),
-              image);
+    const std::string folder = folder_ + "/frames/" + prefix + sequence;
+    MakeFolder(folder);
+    WritePng8(folder + "/" + FrameName(index), image);
   };
   source_.Do([=] { write("source", frame->source); });
   styled_.Do([=] { write("styled", frame->styled); });

@@ -3,6 +3,8 @@
 
 #include <memory>
 #include <optional>
+#include <string>
+#include <utility>
 
 #include "kernels/scene/image.h"
 #include "pipeline/capture/working_views.h"
@@ -30,10 +32,10 @@ struct Frame {
 // them. Errors of the threads are thrown by Write or Finish.
 class FrameWriter {
  public:
-  FrameWriter(const Workspace& workspace, const Vignette& vignette, RunFilms* films)
-      : workspace_(workspace), vignette_(vignette), films_(films) {}
+  FrameWriter(std::string folder, const Vignette& vignette, RunFilms* films)
+      : folder_(std::move(folder)), vignette_(vignette), films_(films) {}
 
-  // frames/<prefix>{source, styled, views_2d, transmittance, edited}/<index>.png
+  // FOLDER/frames/<prefix>{source, styled, views_2d, transmittance, edited}/<index>.png
   void Write(const std::shared_ptr<const Frame>& frame, const FrameSet& set, int index);
   void Finish();
 
@@ -44,7 +46,7 @@ class FrameWriter {
     return picture;
   }
 
-  const Workspace& workspace_;
+  const std::string folder_;
   const Vignette vignette_;
   RunFilms* films_;
   OrderedWorker source_, styled_, views_2d_, grey_, film_;

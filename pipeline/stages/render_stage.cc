@@ -7,25 +7,17 @@
 #include <algorithm>
 #include <filesystem>
 #include <future>
-#include <memory>
-#include <optional>
+#include <iterator>
+#include <utility>
 
-#include "kernels/render/field_renderer.h"
-#include "kernels/scene/common_camera.h"
-#include "pipeline/capture/photo_gains.h"
-#include "pipeline/capture/working_views.h"
-#include "pipeline/fields/field_file.h"
 #include "pipeline/fields/film_timing.h"
-#include "pipeline/program/device_choice.h"
 #include "pipeline/report/stage_metrics.h"
 #include "pipeline/run/run_context.h"
-#include "pipeline/stages/carried_edit.h"
-#include "pipeline/stages/film_frames.h"
 #include "pipeline/stages/film_renderer.h"
+#include "pipeline/stages/frame_units.h"
 #include "pipeline/stages/frame_writer.h"
-#include "pipeline/stages/make_stylizer.h"
-#include "pipeline/stages/object_edit.h"
-#include "pipeline/stages/photo_vignette.h"
+#include "pipeline/stages/render_parts.h"
+#include "pipeline/stages/scene_frames.h"
 #include "pipeline/stages/seen_by_few_recorder.h"
 #include "pipeline/stages/stages.h"
 #include "pipeline/stages/styled_field.h"
@@ -39,204 +31,132 @@ namespace {
 
 constexpr double kMuchSeenByFew = 0.2;  // of the film: worth a warning
 
-// The two fields and the 2D method.
-struct FrameRenderers {
-  std::optional<FieldRenderer> source, styled;
-  std::unique_ptr<ViewStylizer> stylizer;
-  std::unique_ptr<CoverageRenderer> object;  // null where the whole scene is styled
-  std::vector<Image> coverage;               // of the current frame
-  std::optional<CarriedEdit> edit;           // what single photos have beyond the 2D method
-  double seconds = 0;                        // of rendering both fields
-  bool fast_film = false;                    // both renderers are prepared for it
-};
-
-const FrameSet* CommonSet(const std::vector<FrameSet>& sets) {
-  const auto common = std::find_if(sets.begin(), sets.end(), [](const FrameSet& set) {
-    return set.prefix == kCommonPrefix;
-  });
-  return common == sets.end() ? nullptr : &*common;
+void SayPlan(const FramePlan& plan, const RenderOptions& options, Console* console) {
+  if (plan.path.narrowed)
+    console->Info(
+        "the film keeps close to the photos' places: a smoother path would pass through "
+        "surfaces");
+  if (plan.path.transmittance.value.value_or(1) < kClearTransmittance)
+    console->Warn(
+        "the film passes through surfaces, for photos were taken on both sides of them; "
+        "--path views shows the photos' places one by one");
+  if (const FrameSet* common = plan.common()) console->Info(ComparisonNote(common->cameras[0]));
+  if (const std::string note = SmallerFilmNote(options, plan.path.film); !note.empty())
+    console->Info(note);
 }
 
-// The way of the film, if there is one.
-FilmPath PathOf(const WorkingViews& views, const RenderOptions& options,
-                const RadianceField* field) {
-  if (options.films.films) return MakeFilmPath(views, options, field);
-  FilmPath path;
-  path.transmittance = path.photo_distance = Metric::Undefined("films were left out");
-  return path;
-}
-
-// The sets before there is a field: poses in the capture's world, final sizes.
-std::vector<FrameSet> PlannedSets(const RunContext& context) {
-  const WorkingViews views = context.Views();
-  const RenderOptions& options = context.settings.render;
-  return FrameSetsOf(views, options, PathOf(views, options, nullptr));
-}
-
-// The scene as a camera of that gain records it.
-Frame RenderFrame(RunContext* context, FrameRenderers* renderers, const Camera& camera,
-                  const PhotoGain& gain, int index, bool fast, bool with_2d) {
-  const double begin = context->console->StageSeconds();
-  const FieldRenderer &source = *renderers->source, &styled = *renderers->styled;
-  RenderedPair pair =
-      fast ? source.RenderFastWith(styled, camera) : source.RenderWith(styled, camera);
-  renderers->seconds += context->console->StageSeconds() - begin;
-  RenderedView& plain = pair.view;
-  Frame frame;
-  frame.styled = std::move(pair.other_color);
-  frame.source = std::move(plain.color);
-  frame.transmittance = std::move(plain.transmittance);
-  frame.depth = std::move(plain.depth);
-  PutGain(gain, &frame.source);
-  PutGain(gain, &frame.styled);
-  if (!with_2d) return frame;
-  if (renderers->object != nullptr)
-    renderers->coverage = renderers->object->Render(camera);
-  else
-    renderers->coverage = {CoverageOf(frame.transmittance)};
-  if (renderers->stylizer->StylesAnything()) {
-    frame.views_2d = renderers->stylizer->Stylize(frame.source, index);
-    if (!renderers->edit->empty())
-      frame.edited = renderers->edit->AddTo(camera, frame.depth, &*frame.views_2d);
-    MixPicture(frame.source, context->settings.style.strength, &*frame.views_2d);
-    // Nobody said what is wanted where the photo does not look: no difference is shown there.
-    for (int64_t p = 0; p < frame.edited.num_pixels(); ++p)
-      if (frame.edited.pixels[static_cast<size_t>(p)] == 0)
-        std::copy_n(&frame.styled.pixels[static_cast<size_t>(3 * p)], 3,
-                    &frame.views_2d->pixels[static_cast<size_t>(3 * p)]);
-  }
-  return frame;
-}
-
-// For the time that is left: a frame's pixels, of which those that are only in the film cost a
-// third (pipeline/run/stage_estimate.cc).
-double WorkOf(const FrameSet& set) {
-  const Camera& camera = set.cameras[0];
-  return 1e-6 * camera.width * camera.height * (set.prefix == kFilmPrefix ? 1.0 / 3 : 1);
-}
-
-// The renderers of the scene's field and of the style's. Fields have gigabytes: neither stays.
-// Returns the writing of the styled splats, see WriteStyledSplats.
-std::future<void> PrepareFields(const RunContext& context, Backend backend, StoredField before,
-                                FrameRenderers* renderers, std::vector<std::string>* outputs) {
-  const RunSettings& settings = context.settings;
-  const Workspace& style = *context.style;
-  renderers->source.emplace(before.field, backend);
-  StoredField after = StyledFieldOf(std::move(before), style.folder(), settings.style.strength);
-  const std::string kept = style.Path("styled.npz");
-  if (settings.style.keep_field) {
-    WriteFieldFile(kept, after);
+// What else comes of the styled field: styled.npz where it was asked for, and the styled
+// splats, whose writing is returned, see WriteStyledSplats.
+std::future<void> WriteStyledField(const RunContext& context, StoredField styled,
+                                   std::vector<std::string>* outputs) {
+  const std::string kept = context.style->Path("styled.npz");
+  if (context.settings.style.keep_field) {
+    WriteFieldFile(kept, styled);
     outputs->push_back("styled.npz");
   } else {
     std::filesystem::remove(kept);  // of an earlier style
   }
-  renderers->styled.emplace(after.field, backend);
-  std::future<void> splats = WriteStyledSplats(context, std::move(after));
+  std::future<void> splats = WriteStyledSplats(context, std::move(styled));
   if (splats.valid()) outputs->push_back(kStyledSplats);
   return splats;
 }
 
-StageOutcome Render(RunContext* context, const ProgressFunction& progress) {
-  const RunSettings& settings = context->settings;
-  Workspace &workspace = *context->style, &scene = *context->workspace;
-  StoredField before = ReadFieldFile(scene.Path("field.npz"));
-  const WorkingViews views = context->Views().InField(before);
-  // In NDC the field's limit is no distance.
-  SeenByFewRecorder seen(views, before.ndc.on() ? 0 : before.field.near_clip);
-  const FilmPath path = PathOf(views, settings.render, &before.field);
-  const std::unique_ptr<ObjectMasks> masks = OpenObjectMasks(settings, views);
-  FrameRenderers renderers;
-  if (masks != nullptr)
-    renderers.object = std::make_unique<CoverageRenderer>(
-        before.field,
-        ReadObjectFile(workspace.Path("object.npz"), before.field.geometry->num_voxels()));
-  const Backend backend = ChooseBackend(settings.run.device, settings.run.reproducible);
-  StageOutcome outcome;
-  outcome.outputs = {"frames"};
-  std::future<void> splats =
-      PrepareFields(*context, backend, std::move(before), &renderers, &outcome.outputs);
-  renderers.stylizer = MakeSceneStylizer(context, views, masks.get(),
-                                         [&](const Image&, int) { return renderers.coverage; });
-  renderers.edit.emplace(settings.residual, views, *renderers.source);
+// Frames and films of an earlier start.
+void RemoveFrames(const FramePlan& plan, const Workspace& style) {
+  std::filesystem::remove_all(style.Path("frames"));
+  if (plan.film() != nullptr) return;
+  for (const char* name : {kStyledFilm, kWipeFilm, kViews2dFilm})
+    std::filesystem::remove(style.Path(name));
+}
 
-  if (path.narrowed)
-    context->console->Info(
-        "the film keeps close to the photos' places: a smoother path would pass through "
-        "surfaces");
-  if (path.transmittance.value.value_or(1) < kClearTransmittance)
-    context->console->Warn(
-        "the film passes through surfaces, for photos were taken on both sides of them; "
-        "--path views shows the photos' places one by one");
-  const std::vector<FrameSet> sets = FrameSetsOf(views, settings.render, path);
-  int total = 0;
-  double work = 0;
-  for (const FrameSet& set : sets) {
-    total += static_cast<int>(set.cameras.size());
-    work += WorkOf(set) * static_cast<double>(set.cameras.size());
-  }
-  const auto film =
-      std::find_if(sets.begin(), sets.end(), [](const FrameSet& set) { return set.of_film; });
-  const bool has_film = film != sets.end();
-  const int film_frames = has_film ? static_cast<int>(film->cameras.size()) : 0;
-  const bool film_of_views = !has_film || film->of_photos;
-  if (const FrameSet* common = CommonSet(sets))
-    context->console->Info(ComparisonNote(common->cameras[0]));
-  if (const std::string note = SmallerFilmNote(settings.render, path.film); !note.empty())
-    context->console->Info(note);
-
-  const std::string why_exact =
-      PrepareFilm(settings, film_of_views, &*renderers.source, &*renderers.styled);
-  renderers.fast_film = why_exact.empty();
-  if (has_film)
-    context->console->Detail("renderer of the film: " +
-                             FilmRendererText(why_exact, *renderers.source));
-
-  std::filesystem::remove_all(workspace.Path("frames"));
-  if (!has_film)  // films of an earlier start
-    for (const char* name : {kStyledFilm, kWipeFilm, kViews2dFilm})
-      std::filesystem::remove(workspace.Path(name));
-  RunFilms films(workspace, settings.render.fps, film_frames,
-                 film_of_views ? settings.render.fps : kSampleRate);
+JoinedParts RenderAll(const FramePlan& plan, SceneFrames* frames, RunContext* context,
+                      const ProgressFunction& progress, SeenByFewRecorder* seen) {
+  const RenderOptions& options = context->settings.render;
+  const std::string& folder = context->style->folder();
+  const std::vector<FrameUnit> units = UnitsOf(plan.sets);
+  double work = 0, done = 0;
+  for (const FrameUnit& unit : units) work += WorkOf(*unit.set) * (unit.end - unit.begin);
+  const auto tick = [&](const FrameSet& set) {
+    ReportOrThrow(progress, done, work);
+    done += WorkOf(set);
+  };
+  RunFilms films(folder, options.fps, plan.film_frames(),
+                 plan.film_of_views() ? options.fps : kSampleRate);
   {
-    FrameWriter writer(workspace, ParseVignette(settings.render.vignette), &films);
-    double done = 0;
-    for (const FrameSet& set : sets) {
-      for (int i = 0; i < static_cast<int>(set.cameras.size()); ++i) {
-        ReportOrThrow(progress, done, work);
-        done += WorkOf(set);
-        const auto frame = std::make_shared<const Frame>(RenderFrame(
-            context, &renderers, set.cameras[static_cast<size_t>(i)],
-            set.of_photos && settings.render.keep_exposure ? views.Gain(i) : kAsTaken, i,
-            renderers.fast_film && set.prefix == kFilmPrefix, set.prefix != kFilmPrefix));
-        seen.Add(set, i, frame->depth);
-        writer.Write(frame, set, i);
-      }
-      seen.Finish(set);
+    FrameWriter writer(folder, ParseVignette(options.vignette), &films);
+    for (const FrameUnit& unit : units) {
+      RenderUnit(
+          unit, *seen, tick, [&](SampledView view) { seen->Add(std::move(view)); }, frames,
+          &writer);
+      if (unit.end == static_cast<int>(unit.set->cameras.size())) seen->Finish(*unit.set);
     }
     writer.Finish();
   }
-  WriteFrameNames(views, workspace);
-  if (has_film) films.Finish(&outcome.outputs);
-  if (splats.valid()) splats.get();
+  JoinedParts rendered;
+  if (plan.film() != nullptr) films.Finish(&rendered.films);
   if (!films.why_none().empty()) context->console->Warn("no film: " + films.why_none());
+  rendered.device = frames->device();
+  rendered.film_renderer = frames->film_renderer();
+  rendered.seconds = frames->seconds();
+  return rendered;
+}
+
+RenderReport ReportOf(const FramePlan& plan, const JoinedParts& rendered,
+                      const SeenByFewRecorder& seen, const RunSettings& settings) {
   RenderReport report;
-  report.device = DeviceName(backend);
-  report.frames = total;
+  report.device = rendered.device;
+  report.frames = plan.frames();
   report.path_frames = CountSamples(settings.render);
-  report.film_frames = film_frames;
+  report.film_frames = plan.film_frames();
   report.film_seconds = report.film_frames / settings.render.fps;
-  report.path_transmittance = path.transmittance;
-  report.path_photo_distance = path.photo_distance;
-  if (has_film) report.film = {film->cameras[0].width, film->cameras[0].height};
+  report.path_transmittance = plan.path.transmittance;
+  report.path_photo_distance = plan.path.photo_distance;
+  if (const FrameSet* film = plan.film())
+    report.film = {film->cameras[0].width, film->cameras[0].height};
   report.strength = settings.style.strength;
-  if (has_film) report.film_renderer = FilmRendererText(why_exact, *renderers.source);
-  if (renderers.seconds > 0) report.frames_per_second = total / renderers.seconds;
+  report.film_renderer = rendered.film_renderer;
+  if (rendered.seconds > 0) report.frames_per_second = report.frames / rendered.seconds;
   report.seen_by_few = seen.metrics();
+  return report;
+}
+
+StageOutcome Render(const JsonValue& inputs, RunContext* context,
+                    const ProgressFunction& progress) {
+  const RunSettings& settings = context->settings;
+  const Workspace& style = *context->style;
+  Console* const console = context->console;
+  StoredField before = ReadFieldFile(context->workspace->Path("field.npz"));
+  const FramePlan plan = PlanFrames(*context, before);
+  SeenByFewRecorder seen(plan.views, plan.near);
+  StageOutcome outcome;
+  outcome.outputs = {"frames"};
+  std::future<void> splats;
+  const auto take_styled = [&](StoredField styled) {
+    splats = WriteStyledField(*context, std::move(styled), &outcome.outputs);
+  };
+  JoinedParts rendered;
+  if (context->parts.join) {
+    SayPlan(plan, settings.render, console);
+    RemoveFrames(plan, style);
+    rendered = JoinParts(inputs, plan, context, &seen);
+    take_styled(StyledFieldOf(std::move(before), style.folder(), settings.style.strength));
+  } else {
+    SceneFrames frames(context, plan, std::move(before), take_styled);
+    SayPlan(plan, settings.render, console);
+    if (plan.film() != nullptr)
+      console->Detail("renderer of the film: " + frames.film_renderer());
+    RemoveFrames(plan, style);
+    rendered = RenderAll(plan, &frames, context, progress, &seen);
+  }
+  std::ranges::copy(rendered.films, std::back_inserter(outcome.outputs));
+  WriteFrameNames(plan.views, style);
+  if (splats.valid()) splats.get();
+  const RenderReport report = ReportOf(plan, rendered, seen, settings);
   const std::string few = report.seen_by_few.Sentence();
   if (report.seen_by_few.film.value.value_or(0) > kMuchSeenByFew)
-    context->console->Warn(few + ": it may look wrong there; more photos of these parts help");
+    console->Warn(few + ": it may look wrong there; more photos of these parts help");
   else if (!few.empty())
-    context->console->Info(few);
+    console->Info(few);
   PutMetrics(report, &outcome.metrics);
   return outcome;
 }
@@ -264,11 +184,12 @@ Stage RenderStage(RunContext* context) {
         if (const std::string note = SmallerFilmNote(context->settings.render, set.cameras);
             !note.empty())
           stage.plan += "; " + note;
-    if (const FrameSet* common = CommonSet(sets))
-      stage.inputs["common_camera"] = ComparisonNote(common->cameras[0]);
+    for (const FrameSet& set : sets)
+      if (set.prefix == kCommonPrefix)
+        stage.inputs["common_camera"] = ComparisonNote(set.cameras[0]);
   }
-  stage.work = [context](const ProgressFunction& progress) {
-    return Render(context, progress);
+  stage.work = [context, inputs = stage.inputs](const ProgressFunction& progress) {
+    return Render(inputs, context, progress);
   };
   return stage;
 }

@@ -16,11 +16,14 @@ int StrideOf(const FrameSet& set) {
 
 }  // namespace
 
-void SeenByFewRecorder::Add(const FrameSet& set, int index, const Image& depth) {
-  const bool photo = set.prefix.empty();
-  if ((!photo && !set.of_film) || index % StrideOf(set) != 0) return;
-  const Camera& camera = set.cameras[static_cast<size_t>(index)];
-  current_.push_back(SampleView(camera, depth, photo ? views_.Mask(index) : Image()));
+bool SeenByFewRecorder::LooksAt(const FrameSet& set, int index) {
+  return (set.prefix.empty() || set.of_film) && index % StrideOf(set) == 0;
+}
+
+SampledView SeenByFewRecorder::Sample(const FrameSet& set, int index,
+                                      const Image& depth) const {
+  return SampleView(set.cameras[static_cast<size_t>(index)], depth,
+                    set.prefix.empty() ? views_.Mask(index) : Image());
 }
 
 void SeenByFewRecorder::Finish(const FrameSet& set) {

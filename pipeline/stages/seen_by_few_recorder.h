@@ -1,6 +1,7 @@
 // Gathers how much of each frame few photos see.
 #pragma once
 
+#include <utility>
 #include <vector>
 
 #include "evaluate/seen_by_few.h"
@@ -17,7 +18,14 @@ class SeenByFewRecorder {
   // `near`: as of SeenByFew. Keeps a reference to `views`.
   SeenByFewRecorder(const WorkingViews& views, double near) : views_(views), near_(near) {}
 
-  void Add(const FrameSet& set, int index, const Image& depth);
+  // Whether that frame is one of those that are looked at.
+  static bool LooksAt(const FrameSet& set, int index);
+  // What Add needs of one of them.
+  SampledView Sample(const FrameSet& set, int index, const Image& depth) const;
+
+  // The next frame that is looked at.
+  void Add(SampledView view) { current_.push_back(std::move(view)); }
+  // Behind the last frame of a set.
   void Finish(const FrameSet& set);
   const SeenByFewMetrics& metrics() const { return metrics_; }
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <filesystem>
 #include <future>
+#include <utility>
 
 #include "kernels/base/error.h"
 
@@ -25,20 +26,20 @@ Image Wipe(const Image& left, const Image& right, int border) {
   return mixed;
 }
 
-RunFilms::RunFilms(const Workspace& workspace, double frames_per_second, int frames,
+RunFilms::RunFilms(std::string folder, double frames_per_second, int frames,
                    double views_2d_per_second)
-    : workspace_(workspace),
+    : folder_(std::move(folder)),
       frames_per_second_(frames_per_second),
       views_2d_per_second_(views_2d_per_second),
       frames_(frames) {
   // An earlier film: this run's 2D method may not be able to style rendered frames.
-  std::filesystem::remove(workspace.Path(kViews2dFilm));
+  std::filesystem::remove(folder_ + "/" + kViews2dFilm);
 }
 
 void RunFilms::Open(const char* name, const Image& first, double frames_per_second,
                     std::optional<VideoWriter>* writer) {
   if (!*writer)
-    writer->emplace(workspace_.Path(name), first.width, first.height, frames_per_second);
+    writer->emplace(folder_ + "/" + name, first.width, first.height, frames_per_second);
 }
 
 void RunFilms::Add(int index, const Image& source, const Image& styled) {
@@ -76,11 +77,12 @@ void RunFilms::GiveUp(const std::string& why) {
 }
 
 void RunFilms::Finish(std::vector<std::string>* outputs) {
-  if (!film_) return;
-  std::future<void> beside = std::async(std::launch::async, [this] { wipe_->Finish(); });
-  film_->Finish();
-  beside.get();
-  outputs->insert(outputs->end(), {kStyledFilm, kWipeFilm});
+  if (film_) {
+    std::future<void> beside = std::async(std::launch::async, [this] { wipe_->Finish(); });
+    film_->Finish();
+    beside.get();
+    outputs->insert(outputs->end(), {kStyledFilm, kWipeFilm});
+  }
   if (!frame_by_frame_) return;
   frame_by_frame_->Finish();
   outputs->push_back(kViews2dFilm);

@@ -9,7 +9,6 @@
 #include "kernels/scene/image.h"
 #include "pipeline/images/video_writer.h"
 #include "pipeline/workspace/output_names.h"
-#include "pipeline/workspace/workspace.h"
 
 namespace regrade {
 
@@ -18,9 +17,9 @@ Image Wipe(const Image& left, const Image& right, int border);
 
 class RunFilms {
  public:
-  // `frames`: their number, at most one for each camera of the film's path. The film of the 2D
-  // method has its own rate.
-  RunFilms(const Workspace& workspace, double frames_per_second, int frames,
+  // Films are written to `folder`. `frames`: their number, at most one for each camera of the
+  // film's path. The film of the 2D method has its own rate.
+  RunFilms(std::string folder, double frames_per_second, int frames,
            double views_2d_per_second);
 
   // Frame `index` of the film and the wipe; all have one size. Without an H.264 encoder there
@@ -39,7 +38,7 @@ class RunFilms {
             std::optional<VideoWriter>* writer);
   void GiveUp(const std::string& why);
 
-  const Workspace& workspace_;
+  const std::string folder_;
   double frames_per_second_, views_2d_per_second_;
   int frames_;
   std::optional<VideoWriter> film_, wipe_, frame_by_frame_;

@@ -46,12 +46,6 @@ std::string FreePath(const std::string& folder, const std::string& stem, const T
   return path;
 }
 
-void MakeFolder(const std::string& folder) {
-  std::error_code error;
-  fs::create_directories(folder, error);
-  if (error) throw ResourceError(error.message(), folder);
-}
-
 }  // namespace
 
 ViewSession::ViewSession(const std::string& folder, const std::vector<std::string>& style_flags)

@@ -78,7 +78,9 @@ bool StillInPlace(int fd, const std::string& path) {
 
 }  // namespace
 
-FolderLock::FolderLock(const std::string& path, bool break_lock) {
+FolderLock::FolderLock(const std::string& path, LockUse use) {
+  const int kind = use == LockUse::kShared ? LOCK_SH : LOCK_EX;
+  bool break_lock = use == LockUse::kBreak;
   const std::string folder = std::filesystem::path(path).parent_path().parent_path().string();
   while (true) {
     fd_.Reset(OpenOwnFile(path, O_RDWR | O_CREAT));
@@ -89,7 +91,7 @@ FolderLock::FolderLock(const std::string& path, bool break_lock) {
           FileRemedy(error, "choose another folder with --out, or correct its permissions"));
     }
     int status;
-    do status = ::flock(fd_.get(), LOCK_EX | LOCK_NB);
+    do status = ::flock(fd_.get(), kind | LOCK_NB);
     while (status != 0 && errno == EINTR);
     if (status == 0 && StillInPlace(fd_.get(), path)) break;
     if (status != 0) {

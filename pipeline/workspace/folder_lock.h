@@ -7,14 +7,20 @@
 
 namespace regrade {
 
+enum class LockUse {
+  kAlone,   // nobody else holds it
+  kShared,  // others may share it, and nobody holds it alone
+  kBreak,   // alone; replaces the file of a lock that was not released (by a network drive),
+            // which is refused while the holder is alive on this machine
+};
+
 // Holds flock on `path`, a file that is created and stays; its text names pid, host and start
-// time of the holder.
+// time of the holder, or of the last one that shares it.
 class FolderLock {
  public:
   // Throws Error(kFolderInUse) naming the holder, Error(kResources) if the file cannot be
-  // written. `break_lock` replaces the file of a lock that was not released (by a network
-  // drive); it is refused while the holder is alive on this machine.
-  FolderLock(const std::string& path, bool break_lock);
+  // written.
+  FolderLock(const std::string& path, LockUse use);
 
  private:
   FileDescriptor fd_;

@@ -32,6 +32,9 @@ inline constexpr char kScenePage[] = "scene.html";
 // Films of camera paths that were made in a page.
 inline constexpr char kFilmsFolder[] = "films";
 
+// Of `regrade render --part`, in the style's folder.
+inline constexpr char kPartsFolder[] = "parts";
+
 // What `regrade evaluate --splats` renders.
 inline constexpr char kRenderedFolder[] = "rendered";
 
@@ -41,12 +44,14 @@ inline constexpr char kRetouchedFolder[] = "retouched";
 // What is at the top of the output folder and of a style's, besides `styles`: files and whole
 // folders of our own.
 inline constexpr const char* kOwnNames[] = {
-    ".regrade",       "run.json",      "poses",           "field.npz",    "field_2d.npz",
-    "network.npz",    "object.npz",    "residual.npz",    "styled.npz",   "styled.ply",
-    "views_2d",       "frames",        "heatmaps",        "stills",       "layers",
-    kRetouchedFolder, "retouch",       "edit.cube",       "retouch.json", "report.json",
-    "report.html",    kScenePage,      kFilmsFolder,      kStyledFilm,    kWipeFilm,
-    kViews2dFilm,     kRenderedFolder, "styles/.pictures"};
+    ".regrade",     "run.json",    "poses",         "field.npz",
+    "field_2d.npz", "network.npz", "object.npz",    "residual.npz",
+    "styled.npz",   "styled.ply",  "views_2d",      "frames",
+    "heatmaps",     "stills",      "layers",        kRetouchedFolder,
+    "retouch",      "edit.cube",   "retouch.json",  "report.json",
+    "report.html",  kScenePage,    kFilmsFolder,    kStyledFilm,
+    kWipeFilm,      kViews2dFilm,  kRenderedFolder, "styles/.pictures",
+    kPartsFolder};
 
 // "00007.png"
 inline std::string FrameName(int index) { return Format("%05d.png", index); }

@@ -33,13 +33,15 @@ void RefuseForeignFolder(const std::string& folder) {
                        "choose an empty or new folder with --out");
 }
 
-void MakeFolder(const std::string& folder) {
+// Absolute, without an end.
+std::string CleanPath(const std::string& folder) {
   std::error_code error;
-  fs::create_directories(folder, error);
-  if (error || !fs::is_directory(folder))
-    throw ResourceError(
-        error ? "cannot make this folder: " + error.message() : "is not a folder", folder,
-        "choose another folder with --out");
+  std::string path = fs::absolute(folder, error).lexically_normal().string();
+  if (error)
+    throw ResourceError("the working folder is gone: " + error.message(), folder,
+                        "give an absolute path with --out");
+  while (path.size() > 1 && path.back() == '/') path.pop_back();
+  return path;
 }
 
 std::string StagePathIn(const std::string& folder, const std::string& stage) {
@@ -60,6 +62,15 @@ void RemoveTemporaries(const std::string& folder) {
 }
 
 }  // namespace
+
+void MakeFolder(const std::string& folder) {
+  std::error_code error;
+  fs::create_directories(folder, error);
+  if (error || !fs::is_directory(folder))
+    throw ResourceError(
+        error ? "cannot make this folder: " + error.message() : "is not a folder", folder,
+        "choose another folder with --out");
+}
 
 bool Workspace::Exists(const std::string& folder) {
   std::error_code error;
@@ -86,22 +97,24 @@ void Workspace::CheckResults(const std::string& folder,
   }
 }
 
-Workspace::Workspace(const std::string& folder, bool break_lock) {
-  std::error_code error;
-  folder_ = fs::absolute(folder, error).lexically_normal().string();
-  if (error)
-    throw ResourceError("the working folder is gone: " + error.message(), folder,
-                        "give an absolute path with --out");
-  while (folder_.size() > 1 && folder_.back() == '/') folder_.pop_back();
+Workspace::Workspace(const std::string& folder, bool break_lock) : folder_(CleanPath(folder)) {
   MakeFolder(folder_);
   RefuseForeignFolder(folder_);
   RefuseLinks(folder_);
   MakeFolder(folder_ + kOwnFolder);
-  lock_.emplace(folder_ + kOwnFolder + "/lock", break_lock);
+  lock_.emplace(folder_ + kOwnFolder + "/lock", break_lock ? LockUse::kBreak : LockUse::kAlone);
   MakeFolder(Path(".regrade/stages"));
   MakeFolder(Path(".regrade/checkpoints"));
   RefuseOlderRecords();
   RemoveTemporaries(folder_);
+}
+
+Workspace::Workspace(const std::string& folder, BesideOthers) : folder_(CleanPath(folder)) {
+  if (!Exists(folder_))
+    throw InputError("no run has worked in this folder", folder, "name the folder of a run");
+  RefuseLinks(folder_);
+  lock_.emplace(folder_ + kOwnFolder + "/lock", LockUse::kShared);
+  RefuseOlderRecords();
 }
 
 std::string Workspace::NewPath(const std::string& relative) const {

@@ -29,6 +29,9 @@ struct StageStatus {
   std::vector<std::string> why;
 };
 
+// Creates it and those above it. Throws Error(kResources).
+void MakeFolder(const std::string& folder);
+
 class Workspace {
  public:
   // Creates the folder if it is new, locks it, and removes temporaries of interrupted writers.
@@ -36,6 +39,11 @@ class Workspace {
   // Error(kFolderInUse), Error(kInput) if it holds files under our names that we did not write,
   // links among its files (RefuseLinks), or stage records of an older schema.
   explicit Workspace(const std::string& folder, bool break_lock = false);
+  // For a process that works in a folder of its own below it, beside others like it: no run can
+  // have the lock meanwhile, and nothing is removed. Throws the same, and Error(kInput) where
+  // no run has worked.
+  struct BesideOthers {};
+  Workspace(const std::string& folder, BesideOthers);
 
   // True if a run has worked here. Changes nothing.
   static bool Exists(const std::string& folder);

@@ -7,6 +7,7 @@
 #include <filesystem>
 
 #include "kernels/base/error.h"
+#include "pipeline/images/joined_film.h"
 #include "pipeline/images/video_reader.h"
 #include "pipeline/images/video_writer.h"
 #include "tests/pipeline/picture_corpus.h"
@@ -73,6 +74,34 @@ TEST(VideoFile, GroupsAreEncodedByThemselves) {
   EXPECT_GE(static_cast<size_t>(same.first - one.rbegin()), pictures);
   EXPECT_EQ(one.substr(one.size() - pictures), rest.substr(rest.size() - pictures));
   EXPECT_NE(one, other);
+}
+
+TEST(VideoFile, PartsJoinToTheFilmOfOneWriter) {
+  const ScratchFolder scratch;
+  for (const double rate : {24., 30., 23.976})
+    for (const int width : {64, 161}) {
+      const auto film = [&](const char* name, int first, int last) {
+        const std::string path = scratch / name;
+        VideoWriter writer(path, width, 96, rate);
+        for (int i = first; i < last; ++i) writer.Add(Photo(width, 96, i));
+        writer.Finish();
+        return path;
+      };
+      const int frames = 3 * kFilmGroup + 5;
+      const std::string whole = film("whole.mp4", 0, frames);
+      JoinFilms({film("a.mp4", 0, kFilmGroup), film("b.mp4", kFilmGroup, 3 * kFilmGroup),
+                 film("c.mp4", 3 * kFilmGroup, frames)},
+                scratch / "joined.mp4");
+      EXPECT_EQ(ReadBytes(scratch / "joined.mp4"), ReadBytes(whole)) << width << " " << rate;
+    }
+  WriteFilm(scratch / "small.mp4", 32, 32, 3);
+  EXPECT_REGRADE_ERROR(JoinFilms({scratch / "a.mp4", scratch / "small.mp4"}, scratch / "j.mp4"),
+                       ExitCode::kInput, "small.mp4");
+  WriteBytes(scratch / "damaged.mp4", ReadBytes(scratch / "a.mp4").substr(0, 100));
+  EXPECT_REGRADE_ERROR(
+      JoinFilms({scratch / "a.mp4", scratch / "damaged.mp4"}, scratch / "j.mp4"),
+      ExitCode::kInput, "damaged.mp4");
+  EXPECT_FALSE(std::filesystem::exists(scratch / "j.mp4"));
 }
 
 TEST(VideoFile, OddSizesAndOtherChannelsAreTaken) {

@@ -298,6 +298,29 @@ TEST(FolderLock, F38_OfTwentyAtOnceOneWins) {
   }
 }
 
+// Parts of a film: side by side, but not beside a run, whichever came first.
+TEST(FolderLock, F38_PartsShareItAndRunsDoNot) {
+  const TemporaryFolder folder;
+  EXPECT_REGRADE_ERROR(Workspace(folder / "out", Workspace::BesideOthers()), ExitCode::kInput,
+                       "no run has worked");
+  EXPECT_FALSE(std::filesystem::exists(folder / "out"));
+  {
+    const Workspace run(folder / "out");
+    EXPECT_REGRADE_ERROR(Workspace(folder / "out", Workspace::BesideOthers()),
+                         ExitCode::kFolderInUse, "in use by process");
+  }
+  WriteText(folder / "out/of_a_part.regrade-tmp", "begun");
+  {
+    const Workspace part(folder / "out", Workspace::BesideOthers());
+    EXPECT_NO_THROW(Workspace(folder / "out", Workspace::BesideOthers()));
+    EXPECT_REGRADE_ERROR(Workspace(folder / "out"), ExitCode::kFolderInUse,
+                         "in use by process");
+    EXPECT_TRUE(std::filesystem::exists(folder / "out/of_a_part.regrade-tmp"));
+  }
+  EXPECT_NO_THROW(Workspace(folder / "out"));
+  EXPECT_FALSE(std::filesystem::exists(folder / "out/of_a_part.regrade-tmp"));
+}
+
 TEST(FolderLock, F38_DeathReleasesIt) {
   const TemporaryFolder folder;
   const int code = InChild([&folder] {

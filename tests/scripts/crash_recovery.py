@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Kills runs at random times, restarts them until they finish, and compares the results with those of an unkilled run.
 
-  crash_recovery.py REGRADE [--kills 1000] [--pose-kills 50] [--seed 0] [--effects mixed-cameras]
+  crash_recovery.py REGRADE [--kills 1000] [--part-kills 30] [--pose-kills 50] [--seed 0] [--effects mixed-cameras]
 
 After the poses: a small synthetic capture is run once without kills in reproducible mode (the baseline). Then copies of
 its poses are run and killed with SIGKILL, SIGTERM or SIGINT at a random time after a stage has begun, stage by stage,
@@ -12,6 +12,9 @@ its report except for times.
 COLMAP's stage is not reproducible: `regrade pose` is killed (SIGKILL is sent to it alone, not to COLMAP) and restarted
 until it finishes. Its model must have every photo and lie within 0.5 degrees and 1 % of the camera extent of the truth.
 --pose-kills needs colmap. A kill takes about 3 s on two cores.
+
+`regrade render` by parts, three at a time, is killed and begun again in the same way until each has finished; what
+--join makes of them must be the baseline's, too.
 
   --control all   checks that this script finds errors: between two starts a checkpoint is exchanged for that of a run
                   with another seed, a frame is truncated, the record of a finished stage is removed. Each must be found.
@@ -34,7 +37,7 @@ import tempfile
 import time
 import zipfile
 
-from small_run import SMALL, STAGES, STYLE, STYLED, different, make_capture, results
+from small_run import SMALL, STAGES, STYLE, STYLED, call, different, make_capture, results
 from watched_run import Run
 
 SIGNALS = (signal.SIGKILL, signal.SIGTERM, signal.SIGINT)
@@ -182,6 +185,34 @@ class Supervisor:
         self.complete(self.command(self.random.choice((1, 2))), finished)
         self.compare("a killed run")
 
+    def parts_with_kills(self, parts=3):
+        """Renders a finished folder again by parts, side by side, each killed at random times until it has ended."""
+        self.reset(self.posed)
+        self.complete(self.command(more=("--until", "stylize")), ["pose"])
+        part = [[self.regrade, "render", self.work, "--threads", "1", "--part", f"{k + 1}/{parts}"] for k in range(parts)]
+        left = list(range(parts))
+        while left:
+            runs = {k: subprocess.Popen(part[k], stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+                    for k in left}
+            for k, run in runs.items():
+                if self.random.random() < 0.7:
+                    time.sleep(self.random.uniform(0, 0.6 * self.duration["render"]))
+                    run.kill()
+                status = run.wait()
+                if status == -signal.SIGKILL:
+                    self.kills["a part", "SIGKILL"] += 1
+                elif status != 0:
+                    self.report(f"exit status {status} of part {k + 1}")
+                else:
+                    left.remove(k)
+            for name in incomplete_files(self.work):
+                if ".regrade-tmp" not in name:
+                    self.report(f"{name} is incomplete after SIGKILL in a part")
+        status, error = call([self.regrade, "render", self.work, "--join"])
+        if status != 0:
+            self.report(f"the parts were not joined: {error}")
+        self.compare("a film of killed parts")
+
     def pose_with_kills(self, seconds, most, compare_poses):
         """`regrade pose` from photos, with a few kills at any time, until it is finished."""
         self.reset()
@@ -302,7 +333,7 @@ class Supervisor:
 
     def table(self):
         print(f"{'killed in':20}" + "".join(f"{number.name:>9}" for number in SIGNALS))
-        for where in ("the start", *STAGES, "between two stages"):
+        for where in ("the start", *STAGES, "between two stages", "a part"):
             counts = [self.kills[where, number.name] for number in SIGNALS]
             if any(counts):
                 print(f"{where:20}" + "".join(f"{count:9}" for count in counts))
@@ -312,6 +343,7 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("regrade")
     parser.add_argument("--kills", type=int, default=1000, metavar="N", help="kills after the poses (1000)")
+    parser.add_argument("--part-kills", type=int, default=30, metavar="N", help="kills within parts of frames and films (30)")
     parser.add_argument("--pose-kills", type=int, default=50, metavar="N", help="kills within COLMAP's stage (50)")
     parser.add_argument("--seed", type=int, default=0, help="seed of stages, times, signals and threads")
     parser.add_argument("--effects", default="", help="effects of the synthetic capture, e.g. mixed-cameras")
@@ -321,7 +353,7 @@ def main():
     options = parser.parse_args()
     with tempfile.TemporaryDirectory() as scratch:
         supervisor = Supervisor(os.path.abspath(options.regrade), scratch, options.seed, options.effects)
-        if options.control != "none" or options.kills:
+        if options.control != "none" or options.kills or options.part_kills:
             supervisor.run_baseline()
         if options.control != "none":
             supervisor.control(options.control == "short")
@@ -332,6 +364,9 @@ def main():
             if supervisor.total() // 100 > printed:
                 printed = supervisor.total() // 100
                 print(f"{supervisor.total()} kills, {supervisor.compared} results compared", flush=True)
+        begin = supervisor.total()
+        while supervisor.total() - begin < options.part_kills:
+            supervisor.parts_with_kills()
         if options.pose_kills:
             supervisor.pose_kills(options.pose_kills, options.compare_poses)
         supervisor.table()

@@ -1,0 +1,55 @@
+#include "pipeline/stages/frame_units.h"
+
+#include <algorithm>
+#include <cstdio>
+
+#include "kernels/base/error.h"
+#include "pipeline/images/video_writer.h"
+#include "pipeline/workspace/output_names.h"
+
+namespace regrade {
+
+std::string FrameUnit::Name() const {
+  return (set->prefix.empty() ? "views_" : set->prefix) + Format("%05d", begin);
+}
+
+std::string FrameUnit::Text() const {
+  const std::string of = set->prefix == kFilmPrefix     ? "of the film"
+                         : set->prefix == kPathPrefix   ? "where the film is measured"
+                         : set->prefix == kCommonPrefix ? "with one camera"
+                                                        : "at the photos' positions";
+  return Concat("frames ", begin, " to ", end - 1, " ", of);
+}
+
+double WorkOf(const FrameSet& set) {
+  const Camera& camera = set.cameras[0];
+  return 1e-6 * camera.width * camera.height * (set.prefix == kFilmPrefix ? 1.0 / 3 : 1);
+}
+
+std::vector<FrameUnit> UnitsOf(const std::vector<FrameSet>& sets) {
+  std::vector<FrameUnit> units;
+  for (const FrameSet& set : sets) {
+    const int frames = static_cast<int>(set.cameras.size());
+    for (int begin = 0; begin < frames; begin += kFilmGroup)
+      units.push_back({&set, begin, std::min(begin + kFilmGroup, frames)});
+  }
+  return units;
+}
+
+std::vector<FrameUnit> UnitsOfPart(const std::vector<FrameUnit>& units,
+                                   const std::string& part) {
+  constexpr int kMostParts = 100000;
+  int number = 0, parts = 0, read = 0;
+  if (std::sscanf(part.c_str(), "%6d/%6d%n", &number, &parts, &read) != 2 ||
+      read != static_cast<int>(part.size()) || number < 1 || number > parts ||
+      parts > kMostParts)
+    throw UsageError("is not K/N, a part and their number", "--part " + part,
+                     "the first of eight parts is --part 1/8");
+  std::vector<FrameUnit> own;
+  for (size_t i = static_cast<size_t>(number - 1); i < units.size();
+       i += static_cast<size_t>(parts))
+    own.push_back(units[i]);
+  return own;
+}
+
+}  // namespace regrade
