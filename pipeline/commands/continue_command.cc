@@ -1,5 +1,7 @@
 #include "pipeline/commands/continue_command.h"
 
+#include <optional>
+
 #include "kernels/base/error.h"
 #include "pipeline/commands/probe_styles.h"
 #include "pipeline/run_pipeline.h"
@@ -12,19 +14,21 @@ void Continue(const std::string& folder, const Prepared& prepared,
               const std::vector<NamedStyle>& styles, const std::string& first,
               RunContext* context) {
   RunSettings& settings = context->settings;
-  const std::string& part = context->parts.part;
   if (!prepared.run_words.empty()) context->source = prepared.run_words[0];
   settings.run.out = AbsolutePath(folder);
   CheckTogether(settings);
-  if (!part.empty()) {
-    Workspace workspace(folder, Workspace::BesideOthers());
-    context->workspace = &workspace;
-    return RunPart(styles[0].name, context);
-  }
-  Workspace workspace(folder, settings.start.break_lock);
-  context->workspace = &workspace;
-  context->console->OpenLog(workspace.Path(".regrade/log.txt"));
-  RunStyles(first, styles, context);
+  // Other styles of the scene may be worked on beside this one, and of a style its parts.
+  std::optional<Workspace> workspace;
+  if (settings.start.break_lock)
+    workspace.emplace(folder, true);
+  else
+    workspace.emplace(folder, Workspace::BesideOthers());
+  context->workspace = &*workspace;
+  context->console->OpenLog(workspace->Path(".regrade/log.txt"));
+  if (context->parts.part.empty())
+    RunStyles(first, styles, context);
+  else
+    RunPart(styles[0].name, context);
 }
 
 }  // namespace

@@ -16,6 +16,7 @@
 #include "pipeline/files/text.h"
 #include "pipeline/images/joined_film.h"
 #include "pipeline/stages/frame_writer.h"
+#include "pipeline/workspace/folder_lock.h"
 #include "pipeline/workspace/output_names.h"
 
 namespace regrade {
@@ -37,12 +38,6 @@ std::string FolderOfInputs(const RunContext& context, const JsonValue& inputs) {
 
 bool IsThere(const std::string& folder, const FrameUnit& unit) {
   return fs::exists(folder + "/" + unit.Name() + "/" + kUnitRecord);
-}
-
-std::string HostName() {
-  char name[256] = {};
-  ::gethostname(name, sizeof name - 1);
-  return name;
 }
 
 void WriteSeen(const std::string& path, const std::vector<SampledView>& views) {

@@ -16,15 +16,16 @@
 #include "pipeline/files/json_file.h"
 
 namespace regrade {
-namespace {
-
-constexpr uint64_t kMaxHolderBytes = 4096;
 
 std::string HostName() {
   char name[256] = {};
   ::gethostname(name, sizeof name - 1);
   return name;
 }
+
+namespace {
+
+constexpr uint64_t kMaxHolderBytes = 4096;
 
 std::string HolderText() {
   const std::time_t now = std::time(nullptr);

@@ -7,6 +7,9 @@
 
 namespace regrade {
 
+// Of this machine.
+std::string HostName();
+
 enum class LockUse {
   kAlone,   // nobody else holds it
   kShared,  // others may share it, and nobody holds it alone

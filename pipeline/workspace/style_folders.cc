@@ -1,5 +1,7 @@
 #include "pipeline/workspace/style_folders.h"
 
+#include <unistd.h>
+
 #include <algorithm>
 #include <filesystem>
 #include <string_view>
@@ -11,6 +13,7 @@
 #include "pipeline/files/json_file.h"
 #include "pipeline/files/own_files.h"
 #include "pipeline/files/text.h"
+#include "pipeline/workspace/folder_lock.h"
 #include "pipeline/workspace/output_names.h"
 #include "pipeline/workspace/stage_record.h"
 #include "pipeline/workspace/workspace.h"
@@ -184,6 +187,18 @@ void CheckResults(const std::string& folder, const std::vector<std::string>& sty
     Workspace::CheckResults(StyleFolder(folder, style), {"stylize"});
 }
 
+namespace {
+
+// Two styles may be finished at the same moment: each has a temporary of its own.
+template <typename Write>
+void PutInPlace(const std::string& path, const Write& write) {
+  const std::string made = Concat(path, "-", HostName(), "-", ::getpid(), kTemporarySuffix);
+  write(made);
+  RenameDurably(made, path);
+}
+
+}  // namespace
+
 void PublishStyle(const std::string& folder, const std::string& name) {
   const std::string film = StyleFolder(folder, name) + "/" + kStyledFilm,
                     copy = folder + "/" + kStyledFilm;
@@ -191,8 +206,12 @@ void PublishStyle(const std::string& folder, const std::string& name) {
   if (!fs::is_regular_file(film))
     fs::remove(copy, error);  // it would be another style's
   else if (!fs::is_regular_file(copy) || HashFile(film) != HashFile(copy))
-    WriteFileAtomically(copy, ReadWholeFile(film, kMaxFilm));
-  WriteJsonFile(folder + kLastStyle, JsonValue::Object{{"name", name}});
+    PutInPlace(copy, [&](const std::string& path) {
+      WriteFileAtomically(path, ReadWholeFile(film, kMaxFilm));
+    });
+  PutInPlace(folder + kLastStyle, [&](const std::string& path) {
+    WriteJsonFile(path, JsonValue::Object{{"name", name}});
+  });
 }
 
 }  // namespace regrade

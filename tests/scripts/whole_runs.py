@@ -75,9 +75,16 @@ def splats(regrade, work):
     expect(fit["splats"] > 1000 and "voxels" not in fit, f"the fit is not of splats: {fit}")
     for name in ("field.npz", STYLED + "/network.npz", STYLED + "/report.html", STYLED + "/scene.html"):
         expect(os.path.getsize(os.path.join(out, name)) > 1000, f"{name} is missing or empty")
+    # Two more styles, side by side.
+    others = [os.path.join(os.path.dirname(STYLE), f"style_{name}.png") for name in ("night", "autumn")]
+    at_once = [subprocess.Popen([regrade, "stylize", out, "--style", style, "--until", "stylize", "--threads", "1"], stdin=subprocess.DEVNULL,
+                                stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True) for style in others]
+    for process in at_once:
+        _, error = process.communicate(timeout=600)
+        expect(process.returncode == 0, f"two styles at once: {error}")
     run([regrade, "export", out, "--format", "ply", "--out", ply])
     sizes = [os.path.getsize(os.path.join(ply, name)) for name in os.listdir(ply) if name.endswith(".ply")]
-    expect(len(sizes) == 2 and min(sizes) > 1000 * 100, f"splats of the scene and of its style: {os.listdir(ply)}")
+    expect(len(sizes) == 4 and min(sizes) > 1000 * 100, f"splats of the scene and of its styles: {os.listdir(ply)}")
 
 
 def paper(regrade, work):
