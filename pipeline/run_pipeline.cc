@@ -133,6 +133,17 @@ void PrintSummary(const RunContext& context, double seconds) {
   context.console->Info("next: " + assessment.advice);
 }
 
+// Before anything that is there is given up: are all parts there?
+void PrepareJoin(RunContext* context) {
+  const Stage stage = RenderStage(context);
+  const StageEntry* const restart = Find(context->settings.start.restart_from);
+  if (restart > Find(stage.name) &&
+      context->style->Status(stage.name, stage.inputs).state == StageState::kDone)
+    WarnOfOtherParts(stage.inputs, *context);
+  else
+    RequireParts(stage, *context);
+}
+
 // The stages of one style, in its folder; what became of the requirements.
 std::vector<CheckedRequirement> RunStyle(const std::string& first, const std::string& folder,
                                          const std::vector<Requirement>& required,
@@ -143,13 +154,10 @@ std::vector<CheckedRequirement> RunStyle(const std::string& first, const std::st
   context->style = &workspace;
   // From its beginning on the folder belongs to this picture.
   if (!std::filesystem::exists(workspace.Path("run.json"))) WriteRunFile("run", *context);
-  // Before anything that is there is given up.
-  if (context->parts.join)
-    if (const Stage stage = RenderStage(context);
-        workspace.Status(stage.name, stage.inputs).state != StageState::kDone)
-      RequireParts(stage, *context);
+  if (context->parts.join) PrepareJoin(context);
   RunPipeline(first, until, context, styles_after);
-  if (context->parts.join && !settings.start.dry_run) DropParts(*context);
+  if (context->parts.join && !settings.start.dry_run)
+    DropParts(RenderStage(context).inputs, *context);
   std::vector<CheckedRequirement> checked;
   if (!settings.start.dry_run) {
     WriteRunFile("run", *context);
@@ -202,7 +210,9 @@ void RunStyles(const std::string& first, const std::vector<NamedStyle>& styles,
 }
 
 void RunPart(const std::string& style, RunContext* context) {
-  Workspace folder(StyleFolder(context->settings.run.out, style), Workspace::BesideOthers());
+  const std::string path = StyleFolder(context->settings.run.out, style);
+  if (context->settings.start.break_lock) Workspace(path, true);
+  Workspace folder(path, Workspace::BesideOthers());
   context->style = &folder;
   context->settings.style.name = style;
   const StageRunner runner(context->workspace, context->style, context->console);

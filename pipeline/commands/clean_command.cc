@@ -7,6 +7,7 @@
 #include "pipeline/commands/command.h"
 #include "pipeline/program/question.h"
 #include "pipeline/workspace/folder_size.h"
+#include "pipeline/workspace/output_names.h"
 #include "pipeline/workspace/style_folders.h"
 #include "pipeline/workspace/workspace.h"
 
@@ -40,6 +41,7 @@ std::vector<Removable> RemovableIn(const std::string& folder) {
     const std::string style = std::string(kStylesFolder) + "/" + name;
     Workspace::RefuseLinks(StyleFolder(folder, name));
     all.push_back({style + "/frames", "`regrade render` makes them again"});
+    all.push_back({style + "/" + kPartsFolder, "`regrade render --part` makes them again"});
     all.push_back(
         {style + "/field_2d.npz", "made again by `regrade evaluate --control-field`"});
     all.push_back({style + "/styled.npz", "made again from field.npz and network.npz"});

@@ -1,7 +1,5 @@
 #include "pipeline/commands/continue_command.h"
 
-#include <optional>
-
 #include "kernels/base/error.h"
 #include "pipeline/commands/probe_styles.h"
 #include "pipeline/run_pipeline.h"
@@ -18,13 +16,10 @@ void Continue(const std::string& folder, const Prepared& prepared,
   settings.run.out = AbsolutePath(folder);
   CheckTogether(settings);
   // Other styles of the scene may be worked on beside this one, and of a style its parts.
-  std::optional<Workspace> workspace;
-  if (settings.start.break_lock)
-    workspace.emplace(folder, true);
-  else
-    workspace.emplace(folder, Workspace::BesideOthers());
-  context->workspace = &*workspace;
-  context->console->OpenLog(workspace->Path(".regrade/log.txt"));
+  if (settings.start.break_lock) Workspace(folder, true);
+  Workspace workspace(folder, Workspace::BesideOthers());
+  context->workspace = &workspace;
+  context->console->OpenLog(workspace.Path(".regrade/log.txt"));
   if (context->parts.part.empty())
     RunStyles(first, styles, context);
   else
@@ -47,9 +42,15 @@ void ContinueStyle(const Command& command, const Arguments& arguments, const std
   if (settings.style.pictures.size() > 1 && !settings.style.match.On())
     throw UsageError("continues one style", std::string("regrade ") + command.name,
                      "name it with --name");
-  if (context.parts.join && !context.parts.part.empty())
-    throw UsageError("goes without --part", "--join",
-                     "render every part first, then join them");
+  if (const auto part = context.options.Given("part")) {
+    ParsePart(*part);
+    if (context.parts.join)
+      throw UsageError("goes without --part", "--join",
+                       "render every part first, then join them");
+    if (!settings.start.restart_from.empty())
+      throw UsageError("goes without --part", "--restart-from",
+                       "remove parts/ of the style's folder to render parts again");
+  }
   ProbeStyles(&settings, console);
   const std::string given = context.options.Given("name").value_or("");
   Continue(folder, *prepared, {{ChosenStyle(folder, given), settings.style.pictures}}, first,

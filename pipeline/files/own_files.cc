@@ -42,19 +42,22 @@ void RefuseForeign(const std::string& path) {
   Refuse(path, type, error);
 }
 
+// A folder that is gone meanwhile was another process's temporary.
 void RefuseForeignBelow(const std::string& path) {
   RefuseForeign(path);
   std::error_code error;
   if (!fs::is_directory(fs::symlink_status(path, error))) return;
-  for (fs::recursive_directory_iterator it(path, error), end; !error && it != end;
-       it.increment(error)) {
+  for (fs::directory_iterator it(path, error), end; !error && it != end; it.increment(error)) {
     std::error_code of_entry;
     const fs::file_type type = it->symlink_status(of_entry).type();
-    Refuse(it->path().string(), type, of_entry);
-    if (type == fs::file_type::directory && IsPrivateFolderName(it->path().filename().string()))
-      it.disable_recursion_pending();
+    const std::string entry = it->path().string();
+    Refuse(entry, type, of_entry);
+    if (type == fs::file_type::directory &&
+        !IsPrivateFolderName(it->path().filename().string()))
+      RefuseForeignBelow(entry);
   }
-  if (error) throw ResourceError("cannot list the folder: " + error.message(), path);
+  if (error && error != std::errc::no_such_file_or_directory)
+    throw ResourceError("cannot list the folder: " + error.message(), path);
 }
 
 }  // namespace regrade

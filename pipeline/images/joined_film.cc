@@ -3,7 +3,9 @@
 
 #include <unistd.h>
 
+#include <algorithm>
 #include <cstdint>
+#include <limits>
 
 extern "C" {
 #include <libavcodec/avcodec.h>
@@ -21,16 +23,33 @@ namespace {
 
 using namespace ffmpeg;  // NOLINT: owners of its objects
 
+[[noreturn]] void RefusePart(const std::string& why, const std::string& path) {
+  throw InputError("this part of a film " + why, path,
+                   "remove its folder, and render the part again");
+}
+
+// A run's folder may come from a stranger: nothing but an MP4 file is read.
 Input OpenPart(const std::string& path) {
+  AVDictionary* options = nullptr;
+  av_dict_set(&options, "format_whitelist", "mov,mp4,m4a,3gp,3g2,mj2", 0);
+  av_dict_set(&options, "protocol_whitelist", "file", 0);
   AVFormatContext* opened = nullptr;
-  int code = avformat_open_input(&opened, Url(path).c_str(), nullptr, nullptr);
+  int code = avformat_open_input(&opened, Url(path).c_str(), nullptr, &options);
+  av_dict_free(&options);
   Input input(opened);
   if (code >= 0) code = avformat_find_stream_info(input.get(), nullptr);
-  if (code >= 0 && input->nb_streams != 1) code = AVERROR_INVALIDDATA;
-  if (code < 0)
-    throw InputError("cannot read this part of a film: " + ErrorText(code), path,
-                     "remove its folder, and render the part again");
+  if (code < 0) RefusePart("cannot be read: " + ErrorText(code), path);
+  if (input->nb_streams != 1 || input->streams[0]->codecpar->codec_id != AV_CODEC_ID_H264)
+    RefusePart("is not one stream of H.264", path);
   return input;
+}
+
+// Frames of one can follow those of the other.
+bool EncodedAlike(const AVStream& a, const AVStream& b) {
+  const AVCodecParameters &p = *a.codecpar, &q = *b.codecpar;
+  return p.width == q.width && p.height == q.height && p.extradata_size == q.extradata_size &&
+         std::equal(p.extradata, p.extradata + p.extradata_size, q.extradata) &&
+         av_cmp_q(a.avg_frame_rate, b.avg_frame_rate) == 0;
 }
 
 // The film under construction.
@@ -76,18 +95,17 @@ struct JoinedFilm {
     Check(written);
   }
 
-  void Add(const std::string& part) {
-    const Input input = OpenPart(part);
+  void Add(const FilmPart& part) {
+    const Input input = OpenPart(part.path);
     const AVStream& from = *input->streams[0];
     if (stream == nullptr) Open(from);
-    if (from.codecpar->width != stream->codecpar->width ||
-        from.codecpar->height != stream->codecpar->height ||
-        av_cmp_q(from.avg_frame_rate, stream->avg_frame_rate) != 0)
-      throw InputError("this part of a film has another size or frame rate than the first",
-                       part, "remove its folder, and render the part again");
-    int64_t added = 0;
+    if (!EncodedAlike(from, *stream)) RefusePart("is not encoded as the first one", part.path);
+    int64_t added = 0, last = std::numeric_limits<int64_t>::min();
     while (av_read_frame(input.get(), packet.get()) >= 0) {
       av_packet_rescale_ts(packet.get(), from.time_base, frame);
+      if (packet->dts <= last || packet->pts < 0 || packet->pts >= part.frames)
+        RefusePart("has frames at wrong times", part.path);
+      last = packet->dts;
       packet->pts += frames;
       packet->dts += frames;
       packet->duration = 1;
@@ -97,6 +115,8 @@ struct JoinedFilm {
       Check(av_interleaved_write_frame(output.get(), packet.get()));
       ++added;
     }
+    if (added != part.frames)
+      RefusePart(Concat("has ", added, " of ", part.frames, " frames"), part.path);
     frames += added;
   }
 
@@ -117,13 +137,13 @@ struct JoinedFilm {
 
 }  // namespace
 
-void JoinFilms(const std::vector<std::string>& parts, const std::string& path) {
+void JoinFilms(const std::vector<FilmPart>& parts, const std::string& path) {
   REGRADE_CHECK(!parts.empty());
   av_log_set_level(AV_LOG_QUIET);  // errors come back as codes
   JoinedFilm film;
   film.path = path;
   film.temporary = path + kTemporarySuffix;
-  for (const std::string& part : parts) film.Add(part);
+  for (const FilmPart& part : parts) film.Add(part);
   film.Finish();
 }
 

@@ -25,4 +25,11 @@ struct FilmParts {
   bool On() const { return join || !part.empty(); }
 };
 
+struct PartNumber {
+  int number = 1, parts = 1;
+};
+
+// Of "K/N", K from 1 to N. Throws Error(kUsage) for what is not such a text.
+PartNumber ParsePart(const std::string& text);
+
 }  // namespace regrade

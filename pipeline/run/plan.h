@@ -30,7 +30,7 @@ inline constexpr double kProgramBytes = 150e6;
 inline constexpr double kRaysPerSecond = 105e3;  // 80 to 138 on three captures
 inline constexpr double kRateResolution = 160;
 inline constexpr double kDeviceSamplesPerSecond =
-    4e8;  // of an H200, fit and step together: 270 to 450 on three captures
+    1e8;  // of an H200, with all that a step does: 54 to 119 with the paper's schedules
 // With two threads, of a step of kStyleRateRays; of more rays, see PlanStyle.
 inline constexpr double kStyleSecondsPerStep = 0.075;
 inline constexpr double kStyleRateRays = 4096;

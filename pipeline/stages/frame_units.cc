@@ -1,10 +1,10 @@
 #include "pipeline/stages/frame_units.h"
 
 #include <algorithm>
-#include <cstdio>
 
 #include "kernels/base/error.h"
 #include "pipeline/images/video_writer.h"
+#include "pipeline/run/film_parts.h"
 #include "pipeline/workspace/output_names.h"
 
 namespace regrade {
@@ -38,13 +38,7 @@ std::vector<FrameUnit> UnitsOf(const std::vector<FrameSet>& sets) {
 
 std::vector<FrameUnit> UnitsOfPart(const std::vector<FrameUnit>& units,
                                    const std::string& part) {
-  constexpr int kMostParts = 100000;
-  int number = 0, parts = 0, read = 0;
-  if (std::sscanf(part.c_str(), "%6d/%6d%n", &number, &parts, &read) != 2 ||
-      read != static_cast<int>(part.size()) || number < 1 || number > parts ||
-      parts > kMostParts)
-    throw UsageError("is not K/N, a part and their number", "--part " + part,
-                     "the first of eight parts is --part 1/8");
+  const auto [number, parts] = ParsePart(part);
   std::vector<FrameUnit> own;
   for (size_t i = static_cast<size_t>(number - 1); i < units.size();
        i += static_cast<size_t>(parts))

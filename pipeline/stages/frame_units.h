@@ -27,8 +27,7 @@ double WorkOf(const FrameSet& set);
 // such groups. Pointers into `sets`.
 std::vector<FrameUnit> UnitsOf(const std::vector<FrameSet>& sets);
 
-// Those of the part "K/N", K from 1 to N: each N-th, beginning with the K-th. Throws
-// Error(kUsage) for what is not such a text.
+// Those of the part "K/N": each N-th, beginning with the K-th. Throws as ParsePart.
 std::vector<FrameUnit> UnitsOfPart(const std::vector<FrameUnit>& units,
                                    const std::string& part);
 

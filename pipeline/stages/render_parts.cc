@@ -1,13 +1,13 @@
 #include "pipeline/stages/render_parts.h"
 
-#include <unistd.h>
-
 #include <algorithm>
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <set>
 #include <utility>
 
+#include "evaluate/seen_by_few.h"
 #include "kernels/base/error.h"
 #include "kernels/base/hash.h"
 #include "pipeline/fields/film_timing.h"
@@ -26,7 +26,7 @@ namespace fs = std::filesystem;
 
 constexpr char kUnitRecord[] = "unit.json", kSeenDepth[] = "seen.npz",
                kInputs[] = "inputs.json";
-constexpr uint64_t kMostSeen = uint64_t{4} << 30;
+constexpr uint64_t kMostSeen = uint64_t{4} << 30, kMostPicture = uint64_t{1} << 32;
 
 std::string FolderOfParts(const RunContext& context) {
   return context.style->Path(kPartsFolder);
@@ -48,6 +48,20 @@ void WriteSeen(const std::string& path, const std::vector<SampledView>& views) {
   file.WriteTo(path);
 }
 
+// Another process may have rendered the same unit meanwhile; what one left half removed goes.
+void PutInPlace(const std::string& made, const std::string& folder, const FrameUnit& unit) {
+  const std::string whole = folder + "/" + unit.Name();
+  if (!IsThere(folder, unit)) {
+    fs::remove_all(whole);
+    try {
+      RenameDurably(made, whole);
+    } catch (const Error&) {
+      if (!IsThere(folder, unit)) throw;
+    }
+  }
+  fs::remove_all(made);
+}
+
 struct UnitWork {
   RunContext* context;
   const FramePlan& plan;
@@ -58,8 +72,7 @@ struct UnitWork {
   // To a folder of this process's own, which gets its name when it is whole.
   void Do(const std::string& folder, const FrameUnit& unit) const {
     const RenderOptions& options = context->settings.render;
-    const std::string whole = folder + "/" + unit.Name(),
-                      made = Concat(whole, "-", HostName(), "-", ::getpid(), kTemporarySuffix);
+    const std::string whole = folder + "/" + unit.Name(), made = OwnTemporary(whole);
     fs::remove_all(made);
     MakeFolder(made);
     const double before = frames->seconds();
@@ -81,8 +94,7 @@ struct UnitWork {
                   JsonValue::Object{{"device", frames->device()},
                                     {"film_renderer", frames->film_renderer()},
                                     {"seconds", frames->seconds() - before}});
-    if (!IsThere(folder, unit)) RenameDurably(made, whole);
-    fs::remove_all(made);
+    PutInPlace(made, folder, unit);
   }
 };
 
@@ -139,23 +151,22 @@ void RenderPart(const Stage& stage, RunContext* context) {
 
 namespace {
 
-// What else was rendered, where nothing of these inputs was.
+// Which parts of other settings there are.
 std::string OtherParts(const RunContext& context, const JsonValue& inputs) {
   std::error_code error;
   for (const auto& entry : fs::directory_iterator(FolderOfParts(context), error))
-    if (fs::exists(entry.path() / kInputs))
-      return "; there are parts of other settings: " +
+    if (entry.path() != FolderOfInputs(context, inputs) && fs::exists(entry.path() / kInputs))
+      return "there are parts of other settings: " +
              Join(Differences(ReadJsonFile((entry.path() / kInputs).string()), inputs), "; ");
   return "";
 }
 
-// A link where the file system has them: the parts stay until the stage is recorded.
+// A link where the file system has them: the parts stay until all is done.
 void TakeOver(const fs::path& from, const fs::path& to) {
   std::error_code error;
   fs::create_hard_link(from, to, error);
   if (!error) return;
-  fs::copy_file(from, to, fs::copy_options::overwrite_existing, error);
-  if (error) throw ResourceError("cannot copy here: " + error.message(), to.string());
+  WriteFileAtomically(to.string(), ReadWholeFile(from.string(), kMostPicture));
 }
 
 void TakeFrames(const std::string& from, const std::string& to) {
@@ -168,17 +179,37 @@ void TakeFrames(const std::string& from, const std::string& to) {
 }
 
 void ReadSeen(const std::string& path, const FrameUnit& unit, SeenByFewRecorder* seen) {
-  NpzReader file(path, kMostSeen);
+  std::optional<NpzReader> file;
   int read = 0;
   for (int i = unit.begin; i < unit.end; ++i) {
     if (!SeenByFewRecorder::LooksAt(*unit.set, i)) continue;
-    const NpzArray array = file.Read(std::to_string(read++), ArrayType::kF32, {-1, -1});
+    if (!file) file.emplace(path, kMostSeen);
     SampledView view;
     view.camera = unit.set->cameras[static_cast<size_t>(i)];
-    view.depth = Image(static_cast<int>(array.shape[1]), static_cast<int>(array.shape[0]), 1);
+    const auto samples = [](int pixels) { return (pixels + kDepthStride - 1) / kDepthStride; };
+    view.depth = Image(samples(view.camera.width), samples(view.camera.height), 1);
+    const NpzArray array = file->Read(std::to_string(read++), ArrayType::kF32,
+                                      {view.depth.height, view.depth.width});
     std::copy_n(array.As<float>(), view.depth.pixels.size(), view.depth.pixels.begin());
     seen->Add(std::move(view));
   }
+}
+
+// The film of that name, of all units of the sets that it shows; false where none has it.
+bool JoinFilm(const char* name, const std::string& folder, const std::vector<FrameUnit>& units,
+              const Workspace& style) {
+  const bool of_2d = name == std::string(kViews2dFilm);
+  std::vector<FilmPart> films;
+  bool any = false;
+  for (const FrameUnit& unit : units) {
+    if (!(of_2d ? unit.set->of_2d_film : unit.set->of_film)) continue;
+    films.push_back({folder + "/" + unit.Name() + "/" + name, unit.end - unit.begin});
+    any = any || fs::exists(films.back().path);
+  }
+  // Not every 2D method can style rendered frames.
+  if (films.empty() || (of_2d && !any)) return false;
+  JoinFilms(films, style.Path(name));
+  return true;
 }
 
 std::string TextOf(const std::set<std::string>& words) {
@@ -202,6 +233,7 @@ void RequireParts(const Stage& stage, const RunContext& context) {
   throw InputError(
       Concat(count, " of ", units.size(), " groups of frames were not rendered: ",
              TextOf(missing), count > kNamed ? ", ..." : "",
+             count == units.size() && !OtherParts(context, inputs).empty() ? "; " : "",
              count == units.size() ? OtherParts(context, inputs) : ""),
       folder,
       "run `regrade render DIR --part K/N` for each K; what is there is not done again");
@@ -221,27 +253,28 @@ JoinedParts JoinParts(const JsonValue& inputs, const FramePlan& plan, RunContext
     renderers.insert(record.At("film_renderer").AsString());
     joined.seconds += record.At("seconds").AsDouble();
     if (fs::exists(of_unit + "/frames")) TakeFrames(of_unit + "/frames", style.Path("frames"));
-    if (const std::string depth = of_unit + "/" + kSeenDepth; fs::exists(depth))
-      ReadSeen(depth, unit, seen);
+    ReadSeen(of_unit + "/" + kSeenDepth, unit, seen);
     if (unit.end == static_cast<int>(unit.set->cameras.size())) seen->Finish(*unit.set);
   }
   joined.device = TextOf(devices);
   joined.film_renderer = TextOf(renderers);
-  for (const char* name : {kStyledFilm, kWipeFilm, kViews2dFilm}) {
-    std::vector<std::string> films;
-    for (const FrameUnit& unit : units)
-      if (const std::string film = folder + "/" + unit.Name() + "/" + name; fs::exists(film))
-        films.push_back(film);
-    if (films.empty()) continue;
-    JoinFilms(films, style.Path(name));
-    joined.films.push_back(name);
-  }
+  for (const char* name : {kStyledFilm, kWipeFilm, kViews2dFilm})
+    if (JoinFilm(name, folder, units, style)) joined.films.push_back(name);
   return joined;
 }
 
-void DropParts(const RunContext& context) {
+// Under another name first: what is half removed is no part.
+void DropParts(const JsonValue& inputs, const RunContext& context) {
+  const std::string folder = FolderOfInputs(context, inputs), gone = OwnTemporary(folder);
   std::error_code error;
-  fs::remove_all(FolderOfParts(context), error);
+  fs::rename(folder, gone, error);
+  fs::remove_all(gone, error);
+  fs::remove(FolderOfParts(context), error);  // if it is empty
+}
+
+void WarnOfOtherParts(const JsonValue& inputs, const RunContext& context) {
+  if (const std::string others = OtherParts(context, inputs); !others.empty())
+    context.console->Warn("nothing is joined, for this film is there; " + others);
 }
 
 }  // namespace regrade

@@ -22,8 +22,8 @@ void RenderUnit(const FrameUnit& unit, const SeenByFewRecorder& seen,
 
 // Of the stage `render`, the units of context->parts.part that are not there yet, each durable
 // once it is done: parts can be rendered at the same time, killed and begun again. In a dry run
-// says which. Throws Error(kUsage) for a part that is none, what rendering throws, and
-// Error(kExternalProgram) where films cannot be written.
+// says which. Throws what rendering throws, and Error(kExternalProgram) where films cannot be
+// written.
 void RenderPart(const Stage& stage, RunContext* context);
 
 // What joining knows of how units were rendered.
@@ -36,10 +36,14 @@ struct JoinedParts {
 // Throws Error(kInput), which names the units of the stage that nobody rendered.
 void RequireParts(const Stage& stage, const RunContext& context);
 
-// Makes frames/ and the films of the style's folder from the parts of `plan`, all of which are
-// there. They stay: DropParts removes them once the stage is recorded.
+// Makes frames/ and the films of the style's folder from the parts of `plan`. They stay:
+// DropParts removes those of these inputs once all is done. Throws Error(kInput) for parts that
+// lack something.
 JoinedParts JoinParts(const JsonValue& inputs, const FramePlan& plan, RunContext* context,
                       SeenByFewRecorder* seen);
-void DropParts(const RunContext& context);
+void DropParts(const JsonValue& inputs, const RunContext& context);
+
+// Says so where there are parts of other settings.
+void WarnOfOtherParts(const JsonValue& inputs, const RunContext& context);
 
 }  // namespace regrade

@@ -64,6 +64,8 @@ std::future<void> WriteStyledField(const RunContext& context, StoredField styled
 // Frames and films of an earlier start.
 void RemoveFrames(const FramePlan& plan, const Workspace& style) {
   std::filesystem::remove_all(style.Path("frames"));
+  // This run's 2D method may not be able to style rendered frames.
+  std::filesystem::remove(style.Path(kViews2dFilm));
   if (plan.film() != nullptr) return;
   for (const char* name : {kStyledFilm, kWipeFilm, kViews2dFilm})
     std::filesystem::remove(style.Path(name));

@@ -20,12 +20,12 @@ class SeenByFewRecorder {
 
   // Whether that frame is one of those that are looked at.
   static bool LooksAt(const FrameSet& set, int index);
-  // What Add needs of one of them.
+  // The sample of such a frame, for Add.
   SampledView Sample(const FrameSet& set, int index, const Image& depth) const;
 
   // The next frame that is looked at.
   void Add(SampledView view) { current_.push_back(std::move(view)); }
-  // Behind the last frame of a set.
+  // After the last frame of a set.
   void Finish(const FrameSet& set);
   const SeenByFewMetrics& metrics() const { return metrics_; }
 

@@ -31,10 +31,7 @@ RunFilms::RunFilms(std::string folder, double frames_per_second, int frames,
     : folder_(std::move(folder)),
       frames_per_second_(frames_per_second),
       views_2d_per_second_(views_2d_per_second),
-      frames_(frames) {
-  // An earlier film: this run's 2D method may not be able to style rendered frames.
-  std::filesystem::remove(folder_ + "/" + kViews2dFilm);
-}
+      frames_(frames) {}
 
 void RunFilms::Open(const char* name, const Image& first, double frames_per_second,
                     std::optional<VideoWriter>* writer) {

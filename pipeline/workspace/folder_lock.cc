@@ -10,12 +10,16 @@
 #include <cstring>
 #include <ctime>
 #include <filesystem>
+#include <sstream>
 
 #include "kernels/base/error.h"
+#include "pipeline/files/atomic_file.h"
 #include "pipeline/files/file_problem.h"
 #include "pipeline/files/json_file.h"
 
 namespace regrade {
+
+namespace {
 
 std::string HostName() {
   char name[256] = {};
@@ -23,9 +27,7 @@ std::string HostName() {
   return name;
 }
 
-namespace {
-
-constexpr uint64_t kMaxHolderBytes = 4096;
+constexpr uint64_t kMaxHolderBytes = 1 << 20;
 
 std::string HolderText() {
   const std::time_t now = std::time(nullptr);
@@ -54,20 +56,24 @@ struct Holder {
   }
 };
 
-// The holder's record; empty if it is incomplete or something else.
+// The holder's record, of several that of one which is alive here, or the last; empty if it is
+// incomplete or something else.
 Holder ReadHolder(int fd) {
-  Holder holder;
   std::string text(kMaxHolderBytes, '\0');
   const ssize_t size = ::pread(fd, text.data(), text.size(), 0);
   text.resize(size > 0 ? static_cast<size_t>(size) : 0);
-  try {
-    const JsonValue value = ParseJson(text, "lock");
-    holder.host = value.At("host").AsString();
-    holder.start = value.At("start").AsString();
-    holder.pid = value.At("pid").AsInt();
-  } catch (const Error&) {
+  Holder found;
+  std::istringstream lines(text);
+  for (std::string line; std::getline(lines, line) && !found.AliveHere();) {
+    try {
+      const JsonValue value = ParseJson(line, "lock");
+      found.host = value.At("host").AsString();
+      found.start = value.At("start").AsString();
+      found.pid = value.At("pid").AsInt();
+    } catch (const Error&) {
+    }
   }
-  return holder;
+  return found;
 }
 
 // Another run may have replaced the file between open and flock.
@@ -78,6 +84,10 @@ bool StillInPlace(int fd, const std::string& path) {
 }
 
 }  // namespace
+
+std::string OwnTemporary(const std::string& path) {
+  return Concat(path, "-", HostName(), "-", ::getpid(), kTemporarySuffix);
+}
 
 FolderLock::FolderLock(const std::string& path, LockUse use) {
   const int kind = use == LockUse::kShared ? LOCK_SH : LOCK_EX;
@@ -115,7 +125,9 @@ FolderLock::FolderLock(const std::string& path, LockUse use) {
     }
   }
   const std::string text = HolderText();
-  if (::ftruncate(fd_.get(), 0) != 0 ||
+  const bool shared = use == LockUse::kShared;
+  if (shared) ::fcntl(fd_.get(), F_SETFL, O_APPEND);
+  if ((!shared && ::ftruncate(fd_.get(), 0) != 0) ||
       ::pwrite(fd_.get(), text.data(), text.size(), 0) != static_cast<ssize_t>(text.size())) {
     throw ResourceError(std::string("cannot write: ") + std::strerror(errno), path,
                         "free some space, or choose another folder with --out");

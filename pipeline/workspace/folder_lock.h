@@ -7,8 +7,8 @@
 
 namespace regrade {
 
-// Of this machine.
-std::string HostName();
+// Beside `path`, of this process alone: others may write the same file at the same time.
+std::string OwnTemporary(const std::string& path);
 
 enum class LockUse {
   kAlone,   // nobody else holds it
@@ -18,7 +18,7 @@ enum class LockUse {
 };
 
 // Holds flock on `path`, a file that is created and stays; its text names pid, host and start
-// time of the holder, or of the last one that shares it.
+// time of the holder; who shares it adds a line.
 class FolderLock {
  public:
   // Throws Error(kFolderInUse) naming the holder, Error(kResources) if the file cannot be

@@ -1,10 +1,10 @@
 #include "pipeline/workspace/style_folders.h"
 
-#include <unistd.h>
-
 #include <algorithm>
+#include <chrono>
 #include <filesystem>
 #include <string_view>
+#include <thread>
 
 #include "kernels/base/error.h"
 #include "kernels/base/hash.h"
@@ -189,29 +189,31 @@ void CheckResults(const std::string& folder, const std::vector<std::string>& sty
 
 namespace {
 
-// Two styles may be finished at the same moment: each has a temporary of its own.
-template <typename Write>
-void PutInPlace(const std::string& path, const Write& write) {
-  const std::string made = Concat(path, "-", HostName(), "-", ::getpid(), kTemporarySuffix);
-  write(made);
-  RenameDurably(made, path);
+// Two styles may be finished at the same moment.
+FolderLock WaitForLock(const std::string& path) {
+  constexpr int kTries = 300;
+  for (int i = 1;; ++i) {
+    try {
+      return FolderLock(path, LockUse::kAlone);
+    } catch (const Error& error) {
+      if (error.code() != ExitCode::kFolderInUse || i == kTries) throw;
+      std::this_thread::sleep_for(std::chrono::milliseconds(100));
+    }
+  }
 }
 
 }  // namespace
 
 void PublishStyle(const std::string& folder, const std::string& name) {
+  const FolderLock lock = WaitForLock(folder + "/.regrade/publish.lock");
   const std::string film = StyleFolder(folder, name) + "/" + kStyledFilm,
                     copy = folder + "/" + kStyledFilm;
   std::error_code error;
   if (!fs::is_regular_file(film))
     fs::remove(copy, error);  // it would be another style's
   else if (!fs::is_regular_file(copy) || HashFile(film) != HashFile(copy))
-    PutInPlace(copy, [&](const std::string& path) {
-      WriteFileAtomically(path, ReadWholeFile(film, kMaxFilm));
-    });
-  PutInPlace(folder + kLastStyle, [&](const std::string& path) {
-    WriteJsonFile(path, JsonValue::Object{{"name", name}});
-  });
+    WriteFileAtomically(copy, ReadWholeFile(film, kMaxFilm));
+  WriteJsonFile(folder + kLastStyle, JsonValue::Object{{"name", name}});
 }
 
 }  // namespace regrade

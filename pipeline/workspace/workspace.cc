@@ -33,7 +33,7 @@ void RefuseForeignFolder(const std::string& folder) {
                        "choose an empty or new folder with --out");
 }
 
-// Absolute, without an end.
+// Absolute, without a trailing slash.
 std::string CleanPath(const std::string& folder) {
   std::error_code error;
   std::string path = fs::absolute(folder, error).lexically_normal().string();
@@ -113,6 +113,7 @@ Workspace::Workspace(const std::string& folder, BesideOthers) : folder_(CleanPat
   if (!Exists(folder_))
     throw InputError("no run has worked in this folder", folder, "name the folder of a run");
   RefuseLinks(folder_);
+  MakeFolder(Path(".regrade/stages"));
   lock_.emplace(folder_ + kOwnFolder + "/lock", LockUse::kShared);
   RefuseOlderRecords();
 }

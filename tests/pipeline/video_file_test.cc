@@ -85,22 +85,33 @@ TEST(VideoFile, PartsJoinToTheFilmOfOneWriter) {
         VideoWriter writer(path, width, 96, rate);
         for (int i = first; i < last; ++i) writer.Add(Photo(width, 96, i));
         writer.Finish();
-        return path;
+        return FilmPart{path, last - first};
       };
       const int frames = 3 * kFilmGroup + 5;
-      const std::string whole = film("whole.mp4", 0, frames);
+      const std::string whole = film("whole.mp4", 0, frames).path;
       JoinFilms({film("a.mp4", 0, kFilmGroup), film("b.mp4", kFilmGroup, 3 * kFilmGroup),
                  film("c.mp4", 3 * kFilmGroup, frames)},
                 scratch / "joined.mp4");
       EXPECT_EQ(ReadBytes(scratch / "joined.mp4"), ReadBytes(whole)) << width << " " << rate;
     }
+  const FilmPart first = {scratch / "a.mp4", kFilmGroup};
+  const auto refused = [&](const char* name, int frames) {
+    EXPECT_REGRADE_ERROR(JoinFilms({first, {scratch / name, frames}}, scratch / "j.mp4"),
+                         ExitCode::kInput, name);
+  };
   WriteFilm(scratch / "small.mp4", 32, 32, 3);
-  EXPECT_REGRADE_ERROR(JoinFilms({scratch / "a.mp4", scratch / "small.mp4"}, scratch / "j.mp4"),
-                       ExitCode::kInput, "small.mp4");
-  WriteBytes(scratch / "damaged.mp4", ReadBytes(scratch / "a.mp4").substr(0, 100));
-  EXPECT_REGRADE_ERROR(
-      JoinFilms({scratch / "a.mp4", scratch / "damaged.mp4"}, scratch / "j.mp4"),
-      ExitCode::kInput, "damaged.mp4");
+  refused("small.mp4", 3);
+  refused("absent.mp4", 3);
+  refused("a.mp4", kFilmGroup + 1);
+  refused("a.mp4", kFilmGroup - 1);
+  const std::string film = ReadBytes(first.path);
+  WriteBytes(scratch / "no_index.mp4", film.substr(0, 100));
+  refused("no_index.mp4", kFilmGroup);
+  // Its index comes first.
+  WriteBytes(scratch / "cut.mp4", film.substr(0, film.size() / 2));
+  refused("cut.mp4", kFilmGroup);
+  WriteBytes(scratch / "playlist.mp4", "ffconcat version 1.0\nfile a.mp4\n");
+  refused("playlist.mp4", kFilmGroup);
   EXPECT_FALSE(std::filesystem::exists(scratch / "j.mp4"));
 }
 

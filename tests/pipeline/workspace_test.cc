@@ -316,6 +316,14 @@ TEST(FolderLock, F38_PartsShareItAndRunsDoNot) {
     EXPECT_REGRADE_ERROR(Workspace(folder / "out"), ExitCode::kFolderInUse,
                          "in use by process");
     EXPECT_TRUE(std::filesystem::exists(folder / "out/of_a_part.regrade-tmp"));
+    // Of two, the one that came first goes on: its lock is not broken.
+    EXPECT_EQ(InChild([&folder] {
+                const Workspace second(folder / "out", Workspace::BesideOthers());
+                return false;
+              }),
+              0);
+    EXPECT_REGRADE_ERROR(Workspace(folder / "out", true), ExitCode::kFolderInUse,
+                         "still running");
   }
   EXPECT_NO_THROW(Workspace(folder / "out"));
   EXPECT_FALSE(std::filesystem::exists(folder / "out/of_a_part.regrade-tmp"));

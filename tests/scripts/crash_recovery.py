@@ -202,7 +202,7 @@ class Supervisor:
                 if status == -signal.SIGKILL:
                     self.kills["a part", "SIGKILL"] += 1
                 elif status != 0:
-                    self.report(f"exit status {status} of part {k + 1}")
+                    sys.exit(f"exit status {status} of part {k + 1}")
                 else:
                     left.remove(k)
             for name in incomplete_files(self.work):
