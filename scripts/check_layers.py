@@ -84,7 +84,7 @@ ANY_MODULE_SOURCE = r"(reconstruct|stylize|evaluate)/.*\.(cc|cu)"
 ALLOWED = (
     ("OpenCV", r"opencv2/",
      (r"evaluate/(flow_module|optical_flow)\.cc", r"kernels/onnx/onnx_model\.cc", r"pipeline/images/(draw_text|edge_shift)\.cc")),
-    ("FFmpeg", r"lib(av|sw)[a-z]+/", (r"pipeline/images/(ffmpeg_pointers|film_(decoder|frame)|joined_film|libraries|video_writer)\.cc",)),
+    ("FFmpeg", r"lib(av|sw)[a-z]+/", (r"pipeline/images/(ffmpeg_pointers|film_(decoder|frame)|joined_film|libraries|mp4_file|video_writer)\.cc",)),
     ("OpenImageIO", r"OpenImageIO/", (r"pipeline/images/oiio_module\.cc",)),
     ("libjpeg-turbo", r"(jpeglib|jerror|jmorecfg|turbojpeg)\.h", (r"pipeline/images/(jpeg_decoder|picture_encoder)\.cc",)),
     ("libheif", r"libheif/", (r"pipeline/images/(heif_decoder|libraries)\.cc",)),

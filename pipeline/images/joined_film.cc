@@ -1,8 +1,6 @@
 // Calls FFmpeg's libavformat: packets are copied from MP4 to MP4, with later times.
 #include "pipeline/images/joined_film.h"
 
-#include <unistd.h>
-
 #include <algorithm>
 #include <cstdint>
 #include <limits>
@@ -14,9 +12,8 @@ extern "C" {
 }
 
 #include "kernels/base/error.h"
-#include "pipeline/files/atomic_file.h"
 #include "pipeline/images/ffmpeg_pointers.h"
-#include "pipeline/images/video_reader.h"
+#include "pipeline/images/mp4_file.h"
 
 namespace regrade {
 namespace {
@@ -52,99 +49,41 @@ bool EncodedAlike(const AVStream& a, const AVStream& b) {
          av_cmp_q(a.avg_frame_rate, b.avg_frame_rate) == 0;
 }
 
-// The film under construction.
-struct JoinedFilm {
-  std::string path, temporary;
-  Output output;
-  AVStream* stream = nullptr;
-  AVRational frame{};  // its time
-  int64_t frames = 0;  // so far
-  Packet packet{Allocated(av_packet_alloc())};
-
-  ~JoinedFilm() {
-    output.reset();
-    if (!temporary.empty()) ::unlink(temporary.c_str());
+// Adds the part's packets behind `before` frames.
+void Append(const FilmPart& part, int64_t before, Mp4File* film) {
+  const Input input = OpenPart(part.path);
+  const AVStream& from = *input->streams[0];
+  const AVRational frame = av_inv_q(from.avg_frame_rate);
+  if (film->stream() == nullptr) film->Begin(*from.codecpar, frame);
+  if (!EncodedAlike(from, *film->stream()))
+    RefusePart("is not encoded as the first one", part.path);
+  const Packet packet{Allocated(av_packet_alloc())};
+  int64_t added = 0, last = std::numeric_limits<int64_t>::min();
+  for (; av_read_frame(input.get(), packet.get()) >= 0; ++added) {
+    av_packet_rescale_ts(packet.get(), from.time_base, frame);
+    if (packet->dts <= last || packet->pts < 0 || packet->pts >= part.frames)
+      RefusePart("has frames at wrong times", part.path);
+    last = packet->dts;
+    packet->pts += before;
+    packet->dts += before;
+    film->Write(packet.get());
   }
-
-  void Check(int code) const {
-    if (code >= 0 && output->pb != nullptr) code = output->pb->error;
-    if (code < 0)
-      throw ResourceError("cannot write the video: " + ErrorText(code), path,
-                          "free some space, then run the same command again");
-  }
-
-  void Open(const AVStream& first) {
-    AVFormatContext* made = nullptr;
-    const int code =
-        avformat_alloc_output_context2(&made, nullptr, "mp4", Url(temporary).c_str());
-    output.reset(made);
-    Check(code);
-    output->flags |= AVFMT_FLAG_BITEXACT;  // no dates, no version
-    stream = Allocated(avformat_new_stream(output.get(), nullptr));
-    Check(avcodec_parameters_copy(stream->codecpar, first.codecpar));
-    stream->codecpar->codec_tag = 0;
-    stream->codecpar->bit_rate = 0;  // of the first part: the muxer counts that of the whole
-    frame = av_inv_q(first.avg_frame_rate);
-    stream->time_base = frame;
-    stream->avg_frame_rate = first.avg_frame_rate;
-    Check(avio_open(&output->pb, Url(temporary).c_str(), AVIO_FLAG_WRITE));
-    AVDictionary* options = nullptr;
-    av_dict_set(&options, "movflags", "+faststart", 0);
-    const int written = avformat_write_header(output.get(), &options);
-    av_dict_free(&options);
-    Check(written);
-  }
-
-  void Add(const FilmPart& part) {
-    const Input input = OpenPart(part.path);
-    const AVStream& from = *input->streams[0];
-    if (stream == nullptr) Open(from);
-    if (!EncodedAlike(from, *stream)) RefusePart("is not encoded as the first one", part.path);
-    int64_t added = 0, last = std::numeric_limits<int64_t>::min();
-    while (av_read_frame(input.get(), packet.get()) >= 0) {
-      av_packet_rescale_ts(packet.get(), from.time_base, frame);
-      if (packet->dts <= last || packet->pts < 0 || packet->pts >= part.frames)
-        RefusePart("has frames at wrong times", part.path);
-      last = packet->dts;
-      packet->pts += frames;
-      packet->dts += frames;
-      packet->duration = 1;
-      packet->pos = -1;
-      packet->stream_index = 0;
-      av_packet_rescale_ts(packet.get(), frame, stream->time_base);
-      Check(av_interleaved_write_frame(output.get(), packet.get()));
-      ++added;
-    }
-    if (added != part.frames)
-      RefusePart(Concat("has ", added, " of ", part.frames, " frames"), part.path);
-    frames += added;
-  }
-
-  void Finish() {
-    Check(av_write_trailer(output.get()));
-    avio_flush(output->pb);
-    Check(0);
-    Check(avio_closep(&output->pb));
-    SyncFile(temporary);
-    if (const int readable = CountVideoFrames(temporary); readable != frames)
-      throw ResourceError(
-          Concat(readable, " of ", frames, " frames of the video can be read back"), path,
-          "check the disk, then run the same command again");
-    RenameDurably(temporary, path);
-    temporary.clear();
-  }
-};
+  if (added != part.frames)
+    RefusePart(Concat("has ", added, " of ", part.frames, " frames"), part.path);
+}
 
 }  // namespace
 
 void JoinFilms(const std::vector<FilmPart>& parts, const std::string& path) {
   REGRADE_CHECK(!parts.empty());
   av_log_set_level(AV_LOG_QUIET);  // errors come back as codes
-  JoinedFilm film;
-  film.path = path;
-  film.temporary = path + kTemporarySuffix;
-  for (const FilmPart& part : parts) film.Add(part);
-  film.Finish();
+  Mp4File film(path);
+  int64_t frames = 0;
+  for (const FilmPart& part : parts) {
+    Append(part, frames, &film);
+    frames += part.frames;
+  }
+  film.Finish(frames);
 }
 
 }  // namespace regrade

@@ -1,8 +1,5 @@
-// Calls FFmpeg's libraries: libswscale converts the frames, libavcodec (libx264) encodes them,
-// libavformat writes the MP4 file.
+// Calls FFmpeg's libraries: libswscale converts the frames, libavcodec (libx264) encodes them.
 #include "pipeline/images/video_writer.h"
-
-#include <unistd.h>
 
 #include <algorithm>
 #include <cstdint>
@@ -10,7 +7,6 @@
 
 extern "C" {
 #include <libavcodec/avcodec.h>
-#include <libavformat/avformat.h>
 #include <libavutil/cpu.h>
 #include <libavutil/log.h>
 #include <libavutil/opt.h>
@@ -18,10 +14,9 @@ extern "C" {
 }
 
 #include "kernels/base/error.h"
-#include "pipeline/files/atomic_file.h"
 #include "pipeline/images/ffmpeg_pointers.h"
+#include "pipeline/images/mp4_file.h"
 #include "pipeline/images/normalize_photo.h"
-#include "pipeline/images/video_reader.h"
 
 namespace regrade {
 namespace {
@@ -64,34 +59,29 @@ void PutBytes(const Image& picture, int width, int height, uint8_t* to) {
 }  // namespace
 
 struct VideoWriter::State {
-  std::string path, temporary;
+  std::string path;
   int width, height;  // of the frames
   double frames_per_second;
   int64_t frames = 0;        // given to the encoder
   std::vector<uint8_t> rgb;  // a frame at the even size
-  Output output;
-  AVStream* stream = nullptr;
+  Mp4File film;
   Codec encoder;
   Scaler scaler;
   Frame yuv{Allocated(av_frame_alloc())};
   Packet packet{Allocated(av_packet_alloc())};
 
-  ~State() {
-    output.reset();
-    if (!temporary.empty()) ::unlink(temporary.c_str());
-  }
+  State(const std::string& film_path, int frame_width, int frame_height, double rate)
+      : path(film_path),
+        width(frame_width),
+        height(frame_height),
+        frames_per_second(rate),
+        film(film_path) {}
 
   // libx264 itself is there: it fails where memory or threads are not.
   void CheckEncoder(int code, const char* step) const {
     if (code < 0)
       throw ResourceError(std::string("H.264 encoder: cannot ") + step + ": " + ErrorText(code),
                           path, "close other programs, or make a smaller film (--film-size)");
-  }
-  void CheckWrite(int code) const {
-    if (code >= 0 && output->pb != nullptr) code = output->pb->error;
-    if (code < 0)
-      throw ResourceError("cannot write the video: " + ErrorText(code), path,
-                          "free some space, then run the same command again");
   }
 
   void OpenEncoder() {
@@ -112,8 +102,7 @@ struct VideoWriter::State {
     encoder->color_trc = AVCOL_TRC_IEC61966_2_1;  // sRGB
     encoder->thread_count = EncoderThreads(height);
     encoder->flags |= AV_CODEC_FLAG_BITEXACT;
-    if ((output->oformat->flags & AVFMT_GLOBALHEADER) != 0)
-      encoder->flags |= AV_CODEC_FLAG_GLOBAL_HEADER;
+    if (film.WantsGlobalHeader()) encoder->flags |= AV_CODEC_FLAG_GLOBAL_HEADER;
     CheckEncoder(av_opt_set_int(encoder->priv_data, "crf", kVideoCrf, 0), "set the quality");
     CheckEncoder(av_opt_set(encoder->priv_data, "x264-params", InstructionsOfX264(), 0),
                  "choose its instructions");
@@ -136,17 +125,12 @@ struct VideoWriter::State {
   }
 
   void OpenFile() {
-    stream = Allocated(avformat_new_stream(output.get(), nullptr));
-    CheckEncoder(avcodec_parameters_from_context(stream->codecpar, encoder.get()),
+    AVCodecParameters* parameters = Allocated(avcodec_parameters_alloc());
+    const std::unique_ptr<AVCodecParameters, void (*)(AVCodecParameters*)> owner(
+        parameters, [](AVCodecParameters* p) { avcodec_parameters_free(&p); });
+    CheckEncoder(avcodec_parameters_from_context(parameters, encoder.get()),
                  "describe the stream");
-    stream->time_base = encoder->time_base;
-    stream->avg_frame_rate = encoder->framerate;
-    CheckWrite(avio_open(&output->pb, Url(temporary).c_str(), AVIO_FLAG_WRITE));
-    AVDictionary* options = nullptr;
-    av_dict_set(&options, "movflags", "+faststart", 0);
-    const int code = avformat_write_header(output.get(), &options);
-    av_dict_free(&options);
-    CheckWrite(code);
+    film.Begin(*parameters, encoder->time_base);
   }
 
   // Encodes `frame` (null: the rest) and writes what the encoder gives out.
@@ -156,37 +140,21 @@ struct VideoWriter::State {
       const int code = avcodec_receive_packet(encoder.get(), packet.get());
       if (code == AVERROR(EAGAIN) || code == AVERROR_EOF) return;
       CheckEncoder(code, "encode a frame");
-      packet->duration = 1;
-      av_packet_rescale_ts(packet.get(), encoder->time_base, stream->time_base);
-      packet->stream_index = stream->index;
-      CheckWrite(av_interleaved_write_frame(output.get(), packet.get()));
+      film.Write(packet.get());
     }
   }
 };
 
 VideoWriter::VideoWriter(const std::string& path, int width, int height,
-                         double frames_per_second)
-    : state_(std::make_unique<State>()) {
+                         double frames_per_second) {
   REGRADE_CHECK_GT(width, 0);
   REGRADE_CHECK_GT(height, 0);
   REGRADE_CHECK_GT(frames_per_second, 0);
   av_log_set_level(AV_LOG_QUIET);  // errors come back as codes
-  State& s = *state_;
-  s.path = path;
-  s.width = width;
-  s.height = height;
-  s.frames_per_second = frames_per_second;
-  s.temporary = path + kTemporarySuffix;
-  AVFormatContext* output = nullptr;
-  // The muxer opens the file by this name again to move the index to the front.
-  const int code =
-      avformat_alloc_output_context2(&output, nullptr, "mp4", Url(s.temporary).c_str());
-  s.output.reset(output);
-  s.CheckEncoder(code, "make an MP4 file");
-  s.output->flags |= AVFMT_FLAG_BITEXACT;  // no dates, no version
-  s.OpenEncoder();
-  s.OpenScaler();
-  s.OpenFile();
+  state_ = std::make_unique<State>(path, width, height, frames_per_second);
+  state_->OpenEncoder();
+  state_->OpenScaler();
+  state_->OpenFile();
 }
 
 VideoWriter::~VideoWriter() = default;
@@ -212,20 +180,8 @@ void VideoWriter::Add(const Image& frame) {
 }
 
 void VideoWriter::Finish() {
-  State& s = *state_;
-  s.Encode(nullptr);
-  s.CheckWrite(av_write_trailer(s.output.get()));
-  avio_flush(s.output->pb);
-  s.CheckWrite(0);
-  s.CheckWrite(avio_closep(&s.output->pb));
-  SyncFile(s.temporary);
-  const int readable = CountVideoFrames(s.temporary);
-  if (readable != s.frames)
-    throw ResourceError(
-        Concat(readable, " of ", s.frames, " frames of the video can be read back"), s.path,
-        "check the disk, then run the same command again");
-  RenameDurably(s.temporary, s.path);
-  s.temporary.clear();
+  state_->Encode(nullptr);
+  state_->film.Finish(state_->frames);
 }
 
 }  // namespace regrade

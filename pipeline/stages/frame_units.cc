@@ -8,6 +8,16 @@
 #include "pipeline/workspace/output_names.h"
 
 namespace regrade {
+namespace {
+
+// Of a frame: its pixels, in millions, of which those that are only in the film cost a third
+// (pipeline/run/stage_estimate.cc).
+double WorkOf(const FrameSet& set) {
+  const Camera& camera = set.cameras[0];
+  return 1e-6 * camera.width * camera.height * (set.prefix == kFilmPrefix ? 1.0 / 3 : 1);
+}
+
+}  // namespace
 
 std::string FrameUnit::Name() const {
   return (set->prefix.empty() ? "views_" : set->prefix) + Format("%05d", begin);
@@ -19,11 +29,6 @@ std::string FrameUnit::Text() const {
                          : set->prefix == kCommonPrefix ? "with one camera"
                                                         : "at the photos' positions";
   return Concat("frames ", begin, " to ", end - 1, " ", of);
-}
-
-double WorkOf(const FrameSet& set) {
-  const Camera& camera = set.cameras[0];
-  return 1e-6 * camera.width * camera.height * (set.prefix == kFilmPrefix ? 1.0 / 3 : 1);
 }
 
 std::vector<FrameUnit> UnitsOf(const std::vector<FrameSet>& sets) {
@@ -44,6 +49,16 @@ std::vector<FrameUnit> UnitsOfPart(const std::vector<FrameUnit>& units,
        i += static_cast<size_t>(parts))
     own.push_back(units[i]);
   return own;
+}
+
+std::function<void(const FrameSet&)> TickOf(const std::vector<FrameUnit>& units,
+                                            const ProgressFunction& progress) {
+  double work = 0;
+  for (const FrameUnit& unit : units) work += WorkOf(*unit.set) * (unit.end - unit.begin);
+  return [progress, work, done = 0.0](const FrameSet& set) mutable {
+    ReportOrThrow(progress, done, work);
+    done += WorkOf(set);
+  };
 }
 
 }  // namespace regrade

@@ -1,9 +1,11 @@
 // A run's frames in groups that are rendered whole, whichever process renders them.
 #pragma once
 
+#include <functional>
 #include <string>
 #include <vector>
 
+#include "kernels/base/progress.h"
 #include "pipeline/stages/film_frames.h"
 
 namespace regrade {
@@ -19,10 +21,6 @@ struct FrameUnit {
   std::string Text() const;
 };
 
-// Of a frame, for the time that is left: its pixels, in millions, of which those that are only
-// in the film cost a third (pipeline/run/stage_estimate.cc).
-double WorkOf(const FrameSet& set);
-
 // All frames of the sets, in their order, each unit of at most kFilmGroup: films are encoded in
 // such groups. Pointers into `sets`.
 std::vector<FrameUnit> UnitsOf(const std::vector<FrameSet>& sets);
@@ -30,5 +28,10 @@ std::vector<FrameUnit> UnitsOf(const std::vector<FrameSet>& sets);
 // Those of the part "K/N": each N-th, beginning with the K-th. Throws as ParsePart.
 std::vector<FrameUnit> UnitsOfPart(const std::vector<FrameUnit>& units,
                                    const std::string& part);
+
+// To be called before each of their frames, with its set: reports how much is done, and throws
+// as ReportOrThrow.
+std::function<void(const FrameSet&)> TickOf(const std::vector<FrameUnit>& units,
+                                            const ProgressFunction& progress);
 
 }  // namespace regrade

@@ -136,13 +136,7 @@ void RenderPart(const Stage& stage, RunContext* context) {
   console->BeginStage("render", title);
   SceneFrames frames(context, plan, std::move(before), [](StoredField) {});
   const SeenByFewRecorder seen(plan.views, plan.near);
-  double work = 0, done = 0;
-  for (const FrameUnit& unit : units) work += WorkOf(*unit.set) * (unit.end - unit.begin);
-  const ProgressFunction progress = console->StageProgress();
-  const auto tick = [&](const FrameSet& set) {
-    ReportOrThrow(progress, done, work);
-    done += WorkOf(set);
-  };
+  const auto tick = TickOf(units, console->StageProgress());
   for (const FrameUnit& unit : units)
     UnitWork{context, plan, &frames, seen, tick}.Do(folder, unit);
   console->EndStage();

@@ -76,12 +76,7 @@ JoinedParts RenderAll(const FramePlan& plan, SceneFrames* frames, RunContext* co
   const RenderOptions& options = context->settings.render;
   const std::string& folder = context->style->folder();
   const std::vector<FrameUnit> units = UnitsOf(plan.sets);
-  double work = 0, done = 0;
-  for (const FrameUnit& unit : units) work += WorkOf(*unit.set) * (unit.end - unit.begin);
-  const auto tick = [&](const FrameSet& set) {
-    ReportOrThrow(progress, done, work);
-    done += WorkOf(set);
-  };
+  const auto tick = TickOf(units, progress);
   RunFilms films(folder, options.fps, plan.film_frames(),
                  plan.film_of_views() ? options.fps : kSampleRate);
   {

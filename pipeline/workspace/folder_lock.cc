@@ -18,16 +18,15 @@
 #include "pipeline/files/json_file.h"
 
 namespace regrade {
-
 namespace {
+
+constexpr uint64_t kMaxHolderBytes = 1 << 20;
 
 std::string HostName() {
   char name[256] = {};
   ::gethostname(name, sizeof name - 1);
   return name;
 }
-
-constexpr uint64_t kMaxHolderBytes = 1 << 20;
 
 std::string HolderText() {
   const std::time_t now = std::time(nullptr);

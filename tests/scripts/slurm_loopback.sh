@@ -8,6 +8,10 @@
 # `regrade render` makes alone; 77 without Slurm.
 set -euo pipefail
 
+if [[ $# -lt 1 || $1 == --help ]]; then
+  sed -n '2,9s/^# \{0,1\}//p' "${BASH_SOURCE[0]}"
+  exit 0
+fi
 regrade=$(realpath "$1")
 root=$(cd "$(dirname "${BASH_SOURCE[0]}")/../.." && pwd)
 command -v slurmctld >/dev/null && command -v munged >/dev/null && command -v snakemake >/dev/null || exit 77
