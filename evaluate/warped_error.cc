@@ -72,7 +72,7 @@ struct Padding {
 
 }  // namespace
 
-SplatFrame SoftmaxSplat(const Image& moved, const Image& first, const Image& second,
+MovedFrame SoftmaxSplat(const Image& moved, const Image& first, const Image& second,
                         const FlowField& flow, double scale_x, double scale_y, double bias) {
   const int width = flow.width, height = flow.height, channels = Colours(moved);
   for (const Image* image : {&moved, &first, &second}) {
@@ -98,7 +98,7 @@ SplatFrame SoftmaxSplat(const Image& moved, const Image& first, const Image& sec
               weight * moved.pixels[pixel * moved.channels + c];
       }
     }
-  SplatFrame result{Image(width, height, channels), Image(width, height, 1)};
+  MovedFrame result{Image(width, height, channels), Image(width, height, 1)};
   for (size_t p = 0; p < norm.size(); ++p) {
     result.weight.pixels[p] = static_cast<float>(norm[p]);
     if (!(norm[p] > 0)) continue;
@@ -112,7 +112,7 @@ SplatFrame SoftmaxSplat(const Image& moved, const Image& first, const Image& sec
 WarpedError PublishedWarpedError(const Image& earlier, const Image& later,
                                  const FlowField& flow, const PairDistance& lpips) {
   const double width = earlier.width, height = earlier.height;
-  SplatFrame warped = SoftmaxSplat(earlier, earlier, later, flow, width / (width - 1),
+  MovedFrame warped = SoftmaxSplat(earlier, earlier, later, flow, width / (width - 1),
                                    height / (height - 1), kPublishedBias);
   const int channels = warped.color.channels;
   Image masked(earlier.width, earlier.height, channels);
@@ -148,7 +148,7 @@ WarpedError PublishedWarpedError(const Image& earlier, const Image& later,
 WarpedError CorrectedWarpedError(const Image& earlier, const Image& later,
                                  const Image& unstyled_earlier, const Image& unstyled_later,
                                  const FlowField& flow, const PairDistance& lpips) {
-  SplatFrame warped = SoftmaxSplat(earlier, unstyled_earlier, unstyled_later, flow, 1, 1, 0);
+  MovedFrame warped = SoftmaxSplat(earlier, unstyled_earlier, unstyled_later, flow, 1, 1, 0);
   const int channels = warped.color.channels;
   Image target(earlier.width, earlier.height, channels);
   double squares = 0;

@@ -12,7 +12,7 @@
 namespace regrade {
 
 // A frame moved onto the grid of another one.
-struct SplatFrame {
+struct MovedFrame {
   Image color;   // [H, W, C], C the 1 or 3 colour channels
   Image weight;  // [H, W, 1]: the sum that `color` was divided by; 0 where nothing arrived
 };
@@ -23,7 +23,7 @@ struct SplatFrame {
 // f(x))|): B is sampled bilinearly with zeros outside. `first` and `second` are A and B;
 // `moved` is I. k = `scale` per axis. Where n = 0, W = 0. Pixels with flow or a colour that is
 // not finite are not moved. Images and flow are of one size.
-SplatFrame SoftmaxSplat(const Image& moved, const Image& first, const Image& second,
+MovedFrame SoftmaxSplat(const Image& moved, const Image& first, const Image& second,
                         const FlowField& flow, double scale_x, double scale_y, double bias);
 
 // The errors of one pair by one reading; rmse with white = 1.

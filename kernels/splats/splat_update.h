@@ -48,8 +48,27 @@ struct SplatRates {
   }
 };
 
+// Where means may be: world, low <= mean < high. A step that leaves it moves nothing.
+struct SplatHold {
+  Vec3f low{-kUnbounded, -kUnbounded, -kUnbounded}, high{kUnbounded, kUnbounded, kUnbounded};
+  static constexpr float kUnbounded = std::numeric_limits<float>::infinity();
+
+  HD bool Contains(const float* mean) const {
+    for (int a = 0; a < 3; ++a)
+      if (!(mean[a] >= low[a] && mean[a] < high[a])) return false;
+    return true;
+  }
+};
+
 struct SplatUpdate {
   SplatRates rates;
+  int64_t frozen = 0;  // the splats before it stay as they are
+  SplatHold hold;
+  // Of splats that no photo has changed since they were made or copied, the regularizers count
+  // nothing. Alone they are steps of full size, since Adam divides by their own square: where
+  // each photo sees few of all splats, new ones would fade before one sees them (a street of
+  // 120 photos: 17.1 instead of 23.6 dB).
+  bool spare_unseen = false;
   float opacity_weight = 0, scale_weight = 0;         // the lambdas over the numbers of values
   float noise = 0;                                    // of EQ(splat-noise)
   float mean_bound = 1.77245385f, view_bound = 0.2f;  // sqrt(pi) = 1 / (2 kSh0)
@@ -128,17 +147,21 @@ HD inline bool UpdateShape(const SplatUpdate& update, int64_t i, const Splat<flo
     update.Step(gradient, rate, to.value.*of + k, to.first.*of + k, to.second.*of + k);
   };
   const SplatRates& rates = update.rates;
+  const float before[3] = {to.value.mean[3 * i], to.value.mean[3 * i + 1],
+                           to.value.mean[3 * i + 2]};
+  const bool spared = update.spare_unseen && sum == 0 && to.second.opacity_logit[i] == 0;
+  const float opacity_weight = spared ? 0 : update.opacity_weight,
+              scale_weight = spared ? 0 : update.scale_weight;
   const float opacity = exp(LogSigmoid(to.value.opacity_logit[i]));
-  step(d.opacity_logit + update.opacity_weight * opacity * (1 - opacity), rates.opacity_logit,
-       i, &SplatPointers::opacity_logit);
+  step(d.opacity_logit + opacity_weight * opacity * (1 - opacity), rates.opacity_logit, i,
+       &SplatPointers::opacity_logit);
   const float rate_mean = rates.MeanAt(to.value.mean + 3 * i);
   for (int a = 0; a < 3; ++a) {
     const int64_t k = 3 * i + a;
     const float log_scale = to.value.log_scale[k];
     const float scale = exp(log_scale < 20.0f ? log_scale : 20.0f) * LogScaleCounts(log_scale);
     step(d.mean[a], rate_mean, k, &SplatPointers::mean);
-    step(d.log_scale[a] + update.scale_weight * scale, rates.log_scale, k,
-         &SplatPointers::log_scale);
+    step(d.log_scale[a] + scale_weight * scale, rates.log_scale, k, &SplatPointers::log_scale);
   }
   for (int a = 0; a < 4; ++a)
     step(d.quaternion[a], rates.quaternion, 4 * i + a, &SplatPointers::quaternion);
@@ -149,6 +172,8 @@ HD inline bool UpdateShape(const SplatUpdate& update, int64_t i, const Splat<flo
                               {q[0], q[1], q[2], q[3]},
                               to.value.opacity_logit[i]};
   AddSplatNoise(update, i, splat, to.value.mean + 3 * i);
+  if (!update.hold.Contains(mean))
+    for (int a = 0; a < 3; ++a) to.value.mean[3 * i + a] = before[a];
   return true;
 }
 

@@ -89,6 +89,23 @@ struct SplatArrays {
 };
 using Splats = SplatArrays<float>;
 
+// Appends those splats of `from` for whose index `take` is true. Both have the same basis.
+template <typename Take>
+void AppendSplats(const SplatsView<float>& from, const Take& take, Splats* to) {
+  const auto append = [](const float* values, int64_t i, int64_t each,
+                         std::vector<float>* into) {
+    into->insert(into->end(), values + each * i, values + each * (i + 1));
+  };
+  for (int64_t i = 0; i < from.count; ++i) {
+    if (!take(i)) continue;
+    append(from.mean, i, 3, &to->mean);
+    append(from.log_scale, i, 3, &to->log_scale);
+    append(from.quaternion, i, 4, &to->quaternion);
+    append(from.opacity_logit, i, 1, &to->opacity_logit);
+    append(from.sh, i, 3 * from.basis, &to->sh);
+  }
+}
+
 // Whether splat i may be in a picture.
 template <typename T>
 HD bool IsUsable(const SplatsView<T>& splats, int64_t i) {

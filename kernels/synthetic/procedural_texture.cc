@@ -199,11 +199,10 @@ Vec3d LinearFromHex(uint32_t hex) {
 }
 
 Vec3d Albedo(const Paint& paint, double u, double v) {
-  const double coarse =
-      Noise(paint.seed + 20, u / (6 * kFinestDetail), v / (6 * kFinestDetail));
+  const double coarse = Noise(paint.seed + 20, u / (6 * paint.detail), v / (6 * paint.detail));
   const double middle =
-      Noise(paint.seed + 21, u / (2.4 * kFinestDetail), v / (2.4 * kFinestDetail));
-  const double fine = Noise(paint.seed + 22, u / kFinestDetail, v / kFinestDetail);
+      Noise(paint.seed + 21, u / (2.4 * paint.detail), v / (2.4 * paint.detail));
+  const double fine = Noise(paint.seed + 22, u / paint.detail, v / paint.detail);
   const double mottle = 1 + 0.10 * coarse + 0.10 * middle + 0.09 * fine;
   const Vec3d color = PatternColor(paint, u, v) * mottle;
   return {std::clamp(color.x, 0.0, 1.0), std::clamp(color.y, 0.0, 1.0),

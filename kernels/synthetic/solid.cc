@@ -93,11 +93,10 @@ inline bool Misses(const Solid& solid, const RayT<double>& ray) {
   return Dot(offset, offset) - along * along > Dot(solid.half, solid.half) * (1 + 1e-9);
 }
 
-// Distance along the ray; *o and *d are the ray in the solid's frame.
-double Distance(const Solid& solid, const RayT<double>& ray, double after, Vec3d* o, Vec3d* d) {
+// The ray in the solid's frame.
+void ToLocal(const Solid& solid, const RayT<double>& ray, Vec3d* o, Vec3d* d) {
   *o = TurnedBy(ray.origin - solid.center, solid.cos_yaw, -solid.sin_yaw);
   *d = TurnedBy(ray.direction, solid.cos_yaw, -solid.sin_yaw);
-  return Intersect(solid, *o, *d, after);
 }
 
 // Outward normal and paint coordinates at local point p.
@@ -140,37 +139,50 @@ void SetSurface(const Solid& solid, const Vec3d& p, Vec3d* normal, double* u, do
 
 }  // namespace
 
-Hit FindHit(const std::vector<Solid>& solids, const RayT<double>& ray, double min_distance) {
+double HitDistance(const Solid& solid, const RayT<double>& ray, double min_distance) {
+  if (Misses(solid, ray)) return kNever;
+  Vec3d o, d;
+  ToLocal(solid, ray, &o, &d);
+  return Intersect(solid, o, d, min_distance);
+}
+
+Hit HitOf(const std::vector<Solid>& solids, int index, const RayT<double>& ray,
+          double distance) {
   Hit hit;
-  hit.distance = kNever;
-  Vec3d local;
-  for (size_t i = 0; i < solids.size(); ++i) {
-    if (Misses(solids[i], ray)) continue;
-    Vec3d o, d;
-    const double t = Distance(solids[i], ray, min_distance, &o, &d);
-    if (!(t < hit.distance)) continue;
-    hit.distance = t;
-    hit.solid = static_cast<int>(i);
-    local = o + d * t;
-  }
-  if (hit.solid < 0) return hit;
-  const Solid& solid = solids[hit.solid];
-  hit.point = ray.origin + ray.direction * hit.distance;
-  Vec3d normal;
-  SetSurface(solid, local, &normal, &hit.u, &hit.v);
+  hit.distance = distance;
+  hit.solid = index;
+  if (index < 0) return hit;
+  const Solid& solid = solids[index];
+  Vec3d o, d, normal;
+  ToLocal(solid, ray, &o, &d);
+  hit.point = ray.origin + ray.direction * distance;
+  SetSurface(solid, o + d * distance, &normal, &hit.u, &hit.v);
   hit.normal = TurnedBy(normal, solid.cos_yaw, solid.sin_yaw);
   if (Dot(hit.normal, ray.direction) > 0) hit.normal = -hit.normal;
   return hit;
 }
 
+Hit FindHit(const std::vector<Solid>& solids, const RayT<double>& ray, double min_distance) {
+  double nearest = kNever;
+  int index = -1;
+  for (size_t i = 0; i < solids.size(); ++i) {
+    const double t = HitDistance(solids[i], ray, min_distance);
+    if (t < nearest) nearest = t, index = static_cast<int>(i);
+  }
+  return HitOf(solids, index, ray, nearest);
+}
+
 bool IsShadowed(const std::vector<Solid>& solids, const RayT<double>& ray,
                 double min_distance) {
-  Vec3d o, d;
   for (const Solid& solid : solids)
-    if (solid.casts_shadow && !Misses(solid, ray) &&
-        Distance(solid, ray, min_distance, &o, &d) < kNever)
-      return true;
+    if (solid.casts_shadow && HitDistance(solid, ray, min_distance) < kNever) return true;
   return false;
+}
+
+double ContactReach(const Solid& solid) {
+  const double radius = std::max({solid.half.x, solid.half.y, solid.half.z});
+  const bool dims = solid.shape != Shape::kBackdrop && solid.casts_shadow && radius <= 0.4;
+  return dims ? 4 * radius : 0;
 }
 
 }  // namespace regrade

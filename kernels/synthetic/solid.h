@@ -35,10 +35,21 @@ struct Hit {
   int solid = -1;       // index; -1: no hit
 };
 
+// Along the ray to the solid's nearest surface farther than `min_distance`; infinity if there
+// is none.
+double HitDistance(const Solid& solid, const RayT<double>& ray, double min_distance);
+
+// The hit of a solid at that distance; no hit if `index` is -1.
+Hit HitOf(const std::vector<Solid>& solids, int index, const RayT<double>& ray,
+          double distance);
+
 // The nearest solid in front of the ray's origin, farther than `min_distance`.
 Hit FindHit(const std::vector<Solid>& solids, const RayT<double>& ray, double min_distance);
 
 // True if a shadow-casting solid lies ahead on the ray.
 bool IsShadowed(const std::vector<Solid>& solids, const RayT<double>& ray, double min_distance);
+
+// How far from its centre a small solid that casts a shadow dims the sky; 0 of others.
+double ContactReach(const Solid& solid);
 
 }  // namespace regrade

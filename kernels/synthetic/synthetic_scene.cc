@@ -4,64 +4,11 @@
 #include <cmath>
 
 #include "kernels/base/error.h"
-#include "kernels/base/random.h"
+#include "kernels/synthetic/scene_builder.h"
+#include "kernels/synthetic/street_scene.h"
 
 namespace regrade {
 namespace {
-
-// Places solids and gives each paint another random stream.
-class SceneBuilder {
- public:
-  SceneBuilder(const std::string& name, uint64_t seed) : seed_(seed) { scene_.name = name; }
-
-  Paint MakePaint(Pattern pattern, double size, std::array<uint32_t, 5> hex) {
-    Paint paint;
-    paint.pattern = pattern;
-    paint.size = size;
-    for (int i = 0; i < 5; ++i) paint.palette[i] = LinearFromHex(hex[i]);
-    paint.seed = RandomBits(seed_, 1, ++num_paints_);
-    return paint;
-  }
-
-  Solid& Add(Shape shape, Vec3d center, Vec3d half, Paint paint, double yaw_degrees = 0) {
-    Solid solid;
-    solid.shape = shape;
-    solid.center = center;
-    solid.half = half;
-    solid.cos_yaw = std::cos(yaw_degrees * M_PI / 180);
-    solid.sin_yaw = std::sin(yaw_degrees * M_PI / 180);
-    solid.paint = paint;
-    scene_.solids.push_back(solid);
-    return scene_.solids.back();
-  }
-
-  // A ball of glazed ceramic lying on height z.
-  void AddBall(double x, double y, double z, double radius, Paint paint) {
-    Add(Shape::kSphere, {x, y, z + radius}, {radius, 0, 0}, paint).gloss = 0.6;
-  }
-  void AddPot(double x, double y, double z, double radius, double height, Paint paint) {
-    Add(Shape::kCylinder, {x, y, z + height / 2}, {radius, 0, height / 2}, paint).gloss = 0.4;
-  }
-  void AddBlock(double x, double y, double z, Vec3d size, double yaw_degrees, Paint paint) {
-    Add(Shape::kBox, {x, y, z + size.z / 2}, size / 2, paint, yaw_degrees);
-  }
-  // A slab between two corners that casts no shadow.
-  void AddWall(Vec3d low, Vec3d high, Paint paint) {
-    Add(Shape::kBox, (low + high) / 2, (high - low) / 2, paint).casts_shadow = false;
-  }
-
-  SyntheticScene Finish(Vec3d to_sun, Vec3d bounds_min, Vec3d bounds_max) {
-    scene_.to_sun = Normalized(to_sun);
-    scene_.bounds_min = bounds_min;
-    scene_.bounds_max = bounds_max;
-    return scene_;
-  }
-
- private:
-  SyntheticScene scene_;
-  uint64_t seed_;
-  uint64_t num_paints_ = 0;
-};
 
 // Palettes: the ground first. Every scene has warm, cold and green hues.
 constexpr std::array<uint32_t, 5> kStone = {0xd9d2c3, 0xb5644b, 0x4f7f8c, 0x8a8f5a, 0xc9a24f};
@@ -262,6 +209,11 @@ Camera RoomCamera(double turn, int width, int height) {
                 height);
 }
 
+Camera StreetCamera(double turn, int width, int height) {
+  const auto [center, target] = StreetViewpoint(turn);
+  return LookAt(center, target, 0.9, width, height);
+}
+
 }  // namespace
 
 SyntheticScene MakeSyntheticScene(const std::string& name, uint64_t seed) {
@@ -269,6 +221,7 @@ SyntheticScene MakeSyntheticScene(const std::string& name, uint64_t seed) {
   if (name == "wall") return MakeWall(seed);
   if (name == "room") return MakeRoom(seed);
   if (name == "square") return MakeSquare(seed);
+  if (name == "street") return MakeStreet(seed);
   throw UsageError("there is no synthetic scene \"" + name + "\"", "--scene",
                    std::string("choose one of ") + kSyntheticSceneNames);
 }
@@ -281,10 +234,11 @@ std::vector<Camera> SyntheticCameras(const SyntheticScene& scene, int views, int
   std::vector<Camera> cameras;
   for (int i = 0; i < views; ++i) {
     const double turn = static_cast<double>(i) / views;
-    cameras.push_back(scene.name == "table"  ? TableCamera(turn, width, height)
-                      : scene.name == "wall" ? WallCamera(turn, width, height)
-                      : scene.name == "room" ? RoomCamera(turn, width, height)
-                                             : SquareCamera(turn, width, height));
+    cameras.push_back(scene.name == "table"    ? TableCamera(turn, width, height)
+                      : scene.name == "wall"   ? WallCamera(turn, width, height)
+                      : scene.name == "room"   ? RoomCamera(turn, width, height)
+                      : scene.name == "street" ? StreetCamera(turn, width, height)
+                                               : SquareCamera(turn, width, height));
   }
   return cameras;
 }

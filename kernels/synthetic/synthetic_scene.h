@@ -1,6 +1,6 @@
 // Analytic scenes with known ground truth, and the cameras that photograph them.
 //
-// World: z is up, lengths are about those of furniture in metres. Everything visible from a
+// World: z is up, lengths are about metres. Everything visible from a
 // default camera lies inside the scene's bounds.
 #pragma once
 
@@ -23,7 +23,7 @@ struct SyntheticScene {
 };
 
 // For the help text and errors.
-inline constexpr char kSyntheticSceneNames[] = "table|wall|room|square";
+inline constexpr char kSyntheticSceneNames[] = "table|wall|room|square|street";
 
 // The shapes are fixed; `seed` determines the paint. Throws Error (kUsage) for an unknown name,
 // listing the known ones.
@@ -32,6 +32,7 @@ inline constexpr char kSyntheticSceneNames[] = "table|wall|room|square";
 //   room:   a furnished room, cameras on a loop inside, each facing the far side
 //   square: a still life on a pedestal seen from all around, with houses and hills up to 45
 //           times as far away as the cameras
+//   street: 300 m of houses, trees and parked cars on both sides, up one way and back the other
 SyntheticScene MakeSyntheticScene(const std::string& name, uint64_t seed);
 
 // `views` cameras on a closed smooth path: neighbours in the list are neighbours in space, and

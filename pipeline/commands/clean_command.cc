@@ -36,6 +36,7 @@ struct Removable {
 std::vector<Removable> RemovableIn(const std::string& folder) {
   std::vector<Removable> all = {
       {".regrade/work", "not needed any more"},
+      {kBlocksFolder, "`regrade refine` makes them again"},
       {".regrade/checkpoints", "a stage that was interrupted would begin from its start"}};
   for (const std::string& name : StyleNames(folder)) {
     const std::string style = std::string(kStylesFolder) + "/" + name;

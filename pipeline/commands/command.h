@@ -75,6 +75,7 @@ std::string AbsolutePath(const std::string& path);
 void RunStages(const Command&, const Arguments&, Console*);  // run, pose, reconstruct
 void RunStylize(const Command&, const Arguments&, Console*);
 void RunRetouch(const Command&, const Arguments&, Console*);
+void RunRefine(const Command&, const Arguments&, Console*);
 void RunRender(const Command&, const Arguments&, Console*);
 void RunEvaluate(const Command&, const Arguments&, Console*);
 void RunContactSheet(const Command&, const Arguments&, Console*);

@@ -16,6 +16,13 @@ const std::vector<Command>& AllCommands() {
       {"reconstruct", "PHOTOS|CAPTURE --out DIR [OPTIONS]",
        "fits a radiance field to the photos", RunStages,
        "out preset photo-masks video-frames max-memory device restart-from dry-run verbose"},
+      {"refine", "DIR [--preset NAME] [OPTIONS]",
+       "fits the splats of a finished reconstruction in more detail, block by block: for "
+       "scenes "
+       "that do not fit into memory, and for several machines",
+       RunRefine,
+       "blocks part join preset splats splat-steps photo-size max-memory device dry-run "
+       "verbose"},
       {"stylize", "DIR --style PICTURE [PICTURE ...] [OPTIONS]",
        "applies further styles to a finished reconstruction, each in DIR/styles/NAME",
        RunStylize,

@@ -3,14 +3,14 @@
 namespace regrade {
 namespace {
 
-constexpr uint32_t kSplatCheckpoint = 0x5350'0001;  // no version of a voxel fit's
+constexpr uint32_t kSplatCheckpoint = 0x5350'0002;  // no version of a voxel fit's
 
 // Calls visit for every value of the state but its arrays, the curve and the note.
 template <typename State, typename Visit>
 void VisitValues(State* state, const Visit& visit) {
   visit(&state->splats.basis);
   for (int a = 0; a < 3; ++a) visit(&state->splats.background[a]);
-  visit(&state->step);
+  visit(&state->step), visit(&state->frozen);
   auto& tally = state->tally;
   visit(&tally.window_error), visit(&tally.tail_error);
   visit(&tally.window_values), visit(&tally.tail_values);
@@ -68,7 +68,9 @@ std::optional<SplatFitState> UnpackSplatFitState(std::string_view bytes, std::st
   }
   VisitArrays(&state, [&](auto* array) { unpacker.Values(array); });
   const int basis = state.splats.basis;
-  if (!unpacker.at_end() || !IsBasis(basis) || state.step < 0) return std::nullopt;
+  if (!unpacker.at_end() || !IsBasis(basis) || state.step < 0 || state.frozen < 0 ||
+      state.frozen > state.splats.count())
+    return std::nullopt;
   for (Splats* splats : {&state.splats, &state.first_moment, &state.second_moment}) {
     splats->basis = basis;
     if (!Consistent(*splats, state.splats.opacity_logit.size(), basis)) return std::nullopt;

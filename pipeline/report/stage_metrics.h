@@ -65,6 +65,33 @@ struct PoseStageReport {
   }
 };
 
+// Of a field that `regrade refine` made of the first one, in blocks.
+struct RefineReport {
+  std::string settings;  // their hash: the same are not applied twice
+  int blocks = 0;
+  double seconds = 0;     // of all blocks together
+  Metric peak_memory_gb;  // of 10^9 bytes: the most that a process had that made one
+  Metric psnr_before_db;  // of the first field on held-out photos of the same size
+  // On held-out photos, of all pixels together: within 8 pixels of where two blocks meet on
+  // a surface, and elsewhere.
+  Metric psnr_at_seams_db, psnr_elsewhere_db;
+  Metric seams_before_db, elsewhere_before_db;
+
+  template <typename Visit>
+  void Describe(Visit& visit) {
+    visit("settings", settings);
+    visit("blocks", blocks, {.label = "blocks"});
+    visit("seconds", seconds, {.label = "all blocks", .unit = "s", .decimals = 0});
+    visit("peak_memory_gb", peak_memory_gb, {.label = "most memory of a block", .unit = "GB"});
+    visit("psnr_before_db", psnr_before_db, {.label = "before, held out", .unit = "dB"});
+    visit("psnr_at_seams_db", psnr_at_seams_db, {.label = "at seams", .unit = "dB"});
+    visit("psnr_elsewhere_db", psnr_elsewhere_db, {.label = "elsewhere", .unit = "dB"});
+    visit("seams_before_db", seams_before_db, {.label = "at seams before", .unit = "dB"});
+    visit("elsewhere_before_db", elsewhere_before_db,
+          {.label = "elsewhere before", .unit = "dB"});
+  }
+};
+
 struct ReconstructReport {
   RecordedTime time;
   std::string device;
@@ -87,6 +114,7 @@ struct ReconstructReport {
   Curve psnr_at_steps;               // dB on the rays of the last steps
   // Of the trial that decides for or against view dependence.
   std::optional<double> trial_seconds, trial_cpu_seconds;
+  std::optional<RefineReport> refined;
 
   template <typename Visit>
   void Describe(Visit& visit) {
@@ -117,6 +145,7 @@ struct ReconstructReport {
     visit("psnr_at_steps", psnr_at_steps);
     visit("trial_seconds", trial_seconds);
     visit("trial_cpu_seconds", trial_cpu_seconds);
+    visit("refined", refined);
   }
 };
 

@@ -35,10 +35,13 @@ const char* MemoryOf(const FitPlace& place) {
 
 }  // namespace
 
-StagePlan PlanSplatsAt(const FitPlace& place, const SplatFitOptions& options) {
+StagePlan PlanSplatsAt(const FitPlace& place, const SplatFitOptions& of_fit) {
+  SplatFitOptions options = of_fit;
+  options.thousands += static_cast<float>(place.frozen_splats) / 1000;
   return place.backend == Backend::kCuda
              ? PlanSplatFitOnDevice(options, place.pixels, place.photos)
-             : PlanSplatFit(options, place.pixels, place.photos, omp_get_max_threads());
+             : PlanSplatFit(options, place.pixels, place.photos, omp_get_max_threads(),
+                            place.is_block);
 }
 
 SplatFitOptions AtMostOfPixels(SplatFitOptions options, const FitPlace& place) {

@@ -20,6 +20,9 @@ struct FitPlace {
   SceneBox box = {};
   double max_memory_gb = 0;   // of 10^9 bytes; 0: what is free
   bool reproducible = false;  // free memory must not change the fit
+  // Of a block of splats: those around it, and photos are decoded one by one.
+  int64_t frozen_splats = 0;
+  bool is_block = false;
 };
 
 StagePlan PlanFitAt(const FitPlace& place, const FitOptions& options);

@@ -58,9 +58,10 @@ StagePlan PlanFit(const FitOptions& options, int64_t photo_pixels, const SceneBo
 // samples in flight.
 StagePlan PlanFitOnDevice(const FitOptions& options, int64_t photo_pixels, const SceneBox& box);
 // Of splats. On a CPU a splat is taken to have 6 entries, on a card 11; a step's time grows
-// with the photo's pixels and, half of the most on average, with the splats.
+// with the photo's pixels and, half of the most on average, with the splats. `one_by_one`:
+// photos are decoded so, and not kept as they were.
 StagePlan PlanSplatFit(const SplatFitOptions& options, int64_t photo_pixels, int64_t photos,
-                       int threads);
+                       int threads, bool one_by_one = false);
 StagePlan PlanSplatFitOnDevice(const SplatFitOptions& options, int64_t photo_pixels,
                                int64_t photos);
 // Lowers the most splats, to no less than kLeastSplats thousands, as LowerToMemory does.

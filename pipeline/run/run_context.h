@@ -10,6 +10,7 @@
 #include "pipeline/capture/working_views.h"
 #include "pipeline/program/console.h"
 #include "pipeline/run/film_parts.h"
+#include "pipeline/run/refine_options.h"
 #include "pipeline/run/run_settings.h"
 #include "pipeline/run/stage_estimate.h"
 #include "pipeline/workspace/stage_runner.h"
@@ -36,6 +37,7 @@ struct RunContext {
   std::optional<CaptureSize> source_size = {};  // of the photos, once somebody asked for it
   std::vector<PlannedStage> planned = {};       // in a dry run
   FilmParts parts = {};                         // of `regrade render`
+  RefineOptions refine = {};                    // of `regrade refine`
 
   // What `source` is, or the capture that gives a file of splats its cameras. Folders of masks
   // in it hold no photos.

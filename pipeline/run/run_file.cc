@@ -121,10 +121,11 @@ JsonValue RunFileJson(const std::string& command, const RunContext& context) {
   if (!context.source.empty()) words.Append(context.source);
   JsonValue options = context.options.Values();
   // Options of one start are not repeated.
-  const JsonValue start = OptionValues(context.settings.start, context.parts);
+  const JsonValue start = OptionValues(context.settings.start, context.parts),
+                  refine = OptionValues(context.refine);
   JsonValue kept = JsonValue::Object();
   for (const auto& [name, value] : options.AsObject())
-    if (start.Find(name) == nullptr) kept[name] = value;
+    if (start.Find(name) == nullptr && refine.Find(name) == nullptr) kept[name] = value;
   JsonValue run = JsonValue::Object{
       {"schema", kRunSchema},        {"regrade", REGRADE_VERSION},        {"command", command},
       {"arguments", words},          {"seed", context.settings.run.seed}, {"options", kept},

@@ -98,6 +98,13 @@ struct UnitWork {
   }
 };
 
+// Several parts may begin at the same moment.
+void NoteInputs(const std::string& folder, const JsonValue& inputs) {
+  const std::string path = folder + "/" + kInputs, made = OwnTemporary(path);
+  WriteJsonFile(made, inputs);
+  RenameDurably(made, path);
+}
+
 std::string TextOf(const std::vector<FrameUnit>& units) {
   std::vector<std::string> texts;
   for (const FrameUnit& unit : units) texts.push_back(unit.Text());
@@ -131,7 +138,7 @@ void RenderPart(const Stage& stage, RunContext* context) {
   if (context->settings.start.dry_run)
     return console->Info(title + ": would render " + TextOf(units));
   MakeFolder(folder);
-  WriteJsonFile(folder + "/" + kInputs, stage.inputs);
+  NoteInputs(folder, stage.inputs);
   console->Info(title + ": " + TextOf(units));
   console->BeginStage("render", title);
   SceneFrames frames(context, plan, std::move(before), [](StoredField) {});

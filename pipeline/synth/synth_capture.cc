@@ -98,20 +98,23 @@ JsonValue DescribeCapture(const SynthOptions& options, const SynthEffects& effec
                                 {"bounds_max", Vector(scene.bounds_max)},
                                 {"effects", of_effects}};
   if (!options.grade.empty()) description.emplace_back("grade", options.grade);
+  if (!options.flow) description.emplace_back("flow", false);
   return description;
 }
 
 // Creates the folders. Throws Error(kFolderInUse) if there are photos made with other options.
-void ClaimFolder(const fs::path& out, const JsonValue& description, bool with_masks) {
+void ClaimFolder(const fs::path& out, const JsonValue& description, bool with_masks,
+                 bool with_flow) {
   const fs::path record = out / "truth" / "effects.json";
   std::error_code none;
   const bool has_photos = fs::exists(out / "images") && !fs::is_empty(out / "images", none);
   if (has_photos && !(fs::exists(record) && ReadJsonFile(record.string()) == description))
     throw Error(ExitCode::kFolderInUse, "the folder contains other photos",
                 (out / "images").string(), "name another folder, or remove this one first");
-  for (const char* folder :
-       {"images", "truth/depth", "truth/flow", "truth/visible", "masks", "truth/masks"}) {
-    if (!with_masks && std::string(folder).ends_with("masks")) continue;
+  std::vector<const char*> folders = {"images", "truth/depth"};
+  if (with_flow) folders.insert(folders.end(), {"truth/flow", "truth/visible"});
+  if (with_masks) folders.insert(folders.end(), {"masks", "truth/masks"});
+  for (const char* folder : folders) {
     std::error_code error;
     fs::create_directories(out / folder, error);
     if (error)
@@ -145,7 +148,7 @@ void WriteSyntheticCapture(const std::string& out, const SynthOptions& options,
   std::vector<Camera> cameras = SyntheticCameras(scene, options.views, width, height);
   for (int i = 0; i < options.views; ++i)
     cameras[i] = WithSynthLens(effects, WithSynthBody(effects, i, cameras[i]));
-  ClaimFolder(out, DescribeCapture(options, effects, scene), effects.masks);
+  ClaimFolder(out, DescribeCapture(options, effects, scene), effects.masks, options.flow);
 
   const fs::path truth = fs::path(out) / "truth";
   std::vector<TransformsFrame> frames;
@@ -169,7 +172,7 @@ void WriteSyntheticCapture(const std::string& out, const SynthOptions& options,
     }
     for (const int gap : kSynthGaps)
       for (const int j : {i - gap, i + gap})
-        if (j >= 0 && j < options.views)
+        if (options.flow && j >= 0 && j < options.views)
           WriteMotion(truth, i, j, TrueMotion(scene, cameras[i], cameras[j]));
     frames.push_back({"../images/" + name, cameras[i]});
     if (effects.poses) depths.push_back(std::move(view.depth));

@@ -6,6 +6,7 @@
 
 #include "kernels/base/options.h"
 #include "kernels/base/progress.h"
+#include "kernels/synthetic/synthetic_scene.h"
 
 namespace regrade {
 
@@ -15,14 +16,16 @@ struct SynthOptions {
   std::string size = "640x480";
   std::string effects;  // comma-separated
   std::string grade;
+  bool flow = true;
   uint64_t seed = 0;
 
   template <typename Bind>
   void Describe(Bind& bind) {
-    bind("scene", scene,
-         {.help = "a still life on a table, a wall with shelves, or surroundings seen in all "
-                  "directions: a room or a square",
-          .choices = "table|wall|room|square"});
+    bind(
+        "scene", scene,
+        {.help = "a still life on a table, a wall with shelves, surroundings seen in all "
+                 "directions (a room or a square), or a street of 300 m for hundreds of photos",
+         .choices = kSyntheticSceneNames});
     bind("views", views, {.unit = "photos", .help = "number of photos", .min = 2, .max = 9999});
     bind("size", size, {.unit = "pixels", .help = "WIDTHxHEIGHT of a photo"});
     bind(
@@ -39,6 +42,10 @@ struct SynthOptions {
                  "the place in the scene, by exchanging two colours of one object, or by a "
                  "vignette over the first",
          .choices = "|global|local|object|vignette"});
+    bind("flow", flow,
+         {.help =
+              "writes the motion between neighbouring photos, and what both see: up to eight "
+              "files for each photo"});
     bind("seed", seed, {.help = "seed of textures, exposures and noise"});
   }
 };
@@ -51,8 +58,8 @@ inline constexpr int kSynthGaps[] = {1, 5};
 //   OUT/truth/transforms.json             cameras; file paths relative to OUT/truth
 //   OUT/truth/depth/00000.npy             [H, W] float32, z along the optical axis, world units
 //   OUT/truth/flow/00000_00001.flo        motion of view i to view j, pixels, for views
-//                                         kSynthGaps apart, in both directions
-//   OUT/truth/visible/00000_00001.png     255 where view j sees the same point
+//                                         kSynthGaps apart, in both directions; with `flow`
+//   OUT/truth/visible/00000_00001.png     255 where view j sees the same point; with `flow`
 //   with `masks`: OUT/masks/00000.png, some of them wrong, and correct ones in OUT/truth/masks/
 //   with `poses`: OUT/sparse/0/, a COLMAP model with pose errors (synth_model.h)
 //   with `grade`: OUT/truth/graded/00000.png, what the true grade makes of each photo

@@ -35,6 +35,9 @@ inline constexpr char kFilmsFolder[] = "films";
 // Of `regrade render --part`, in the style's folder.
 inline constexpr char kPartsFolder[] = "parts";
 
+// Of `regrade refine`.
+inline constexpr char kBlocksFolder[] = "blocks";
+
 // What `regrade evaluate --splats` renders.
 inline constexpr char kRenderedFolder[] = "rendered";
 
@@ -51,7 +54,7 @@ inline constexpr const char* kOwnNames[] = {
     "retouch",      "edit.cube",   "retouch.json",  "report.json",
     "report.html",  kScenePage,    kFilmsFolder,    kStyledFilm,
     kWipeFilm,      kViews2dFilm,  kRenderedFolder, "styles/.pictures",
-    kPartsFolder};
+    kPartsFolder,   kBlocksFolder};
 
 // "00007.png"
 inline std::string FrameName(int index) { return Format("%05d.png", index); }

@@ -25,9 +25,16 @@ double Psnr(double error, int64_t values) {
 
 class SplatFitter {
  public:
-  SplatFitter(const std::vector<TrainingView>& views, const SceneBox& box,
-              const SplatFitOptions& options, const SplatFitHooks& hooks, Backend backend)
-      : views_(views), box_(box), options_(options), hooks_(hooks), photos_(views) {
+  // `views`: what the photos were made of, where they begin at half their size.
+  SplatFitter(const SplatPhotos& photos, const std::vector<TrainingView>* views,
+              const SplatHold& hold, const SceneBox& box, const SplatFitOptions& options,
+              const SplatFitHooks& hooks, Backend backend)
+      : photos_(photos),
+        views_(views),
+        hold_(hold),
+        box_(box),
+        options_(options),
+        hooks_(hooks) {
     const SplatOptions render = SplatOptionsFor(box.near_clip, box.radius, -1);
     engine_ =
         backend == Backend::kCuda ? MakeCudaSplatEngine(render) : MakeCpuSplatEngine(render);
@@ -51,12 +58,13 @@ class SplatFitter {
     if (hooks_.resume != nullptr) {
       state = std::move(*hooks_.resume);
     } else {
-      state.splats = InitialSplats(views_, photos_, box_, options_);
+      state.splats = InitialSplats(*views_, photos_, box_, options_);
       state.splats.background = box_.background.value_or(photos_.mean_color());
       state.first_moment = Splats(state.splats.count(), 1);
       state.second_moment = state.first_moment;
     }
     step_ = state.step;
+    frozen_ = state.frozen;
     tally_ = std::move(state.tally);
     engine_->SetState(std::move(state));
     start_ = last_checkpoint_ = ClockSeconds();
@@ -85,13 +93,14 @@ class SplatFitter {
 
  private:
   float Steps() const { return static_cast<float>(options_.steps); }
+  int64_t count() const { return engine_->count() - frozen_; }  // that change
   int At(float part) const { return static_cast<int>(std::lround(part * Steps())); }
   bool is_long() const { return options_.steps >= options_.long_from; }
 
   // Half the photos' size at first.
   void ChoosePhotos() {
-    const bool small = step_ < At(options_.small_until);
-    if (small && !small_) small_.emplace(views_, 2);
+    const bool small = views_ != nullptr && step_ < At(options_.small_until);
+    if (small && !small_) small_.emplace(*views_, 2);
     if (!small) small_.reset();
     engine_->SetPhotos(small ? &*small_ : &photos_);
   }
@@ -137,10 +146,13 @@ class SplatFitter {
                     middle_,
                     extent_};
     update.noise = options_.noise * rate;
+    update.frozen = frozen_;
+    update.hold = hold_;
+    update.spare_unseen = photos_.count() > kManyPhotos;
     if (is_long())
       step.dropout =
           SplatDropout(options_.dropout * part, options_.seed, static_cast<uint64_t>(step_));
-    const float splats = static_cast<float>(engine_->count());
+    const float splats = static_cast<float>(count());
     update.opacity_weight = options_.opacity_weight / splats;
     update.scale_weight = options_.scale_weight / (3 * splats);
     update.seed = options_.seed;
@@ -166,9 +178,10 @@ class SplatFitter {
       return;
     const uint64_t number = static_cast<uint64_t>(step_);
     std::vector<float> logits = engine_->OpacityLogits();
+    logits.erase(logits.begin(), logits.begin() + frozen_);
     const PopulationChange moved = MoveDead(logits, options_.seed, number);
-    if (!moved.copies.empty()) engine_->Change(moved);
-    const int64_t now = engine_->count();
+    if (!moved.copies.empty()) engine_->Change(Behind(frozen_, moved));
+    const int64_t now = count();
     const float growth =
         std::pow(1 + options_.growth,
                  static_cast<float>(each) / std::max(1.0f, options_.grow_each * Steps()));
@@ -180,7 +193,7 @@ class SplatFitter {
       logits[static_cast<size_t>(copied.index)] = copied.opacity_logit;
     for (const SplatCopy& copy : moved.copies)
       logits[static_cast<size_t>(copy.to)] = logits[static_cast<size_t>(copy.from)];
-    engine_->Change(Grow(logits, more, options_.seed, number));
+    engine_->Change(Behind(frozen_, Grow(logits, more, options_.seed, number)));
   }
 
   void CloseWindow() {
@@ -191,10 +204,10 @@ class SplatFitter {
       tally_.tail_values += tally_.window_values;
     }
     const double psnr = Psnr(tally_.window_error, tally_.window_values);
-    tally_.curve.push_back({step_, ClockSeconds() - start_ - idle_, psnr, engine_->count()});
+    tally_.curve.push_back({step_, ClockSeconds() - start_ - idle_, psnr, count()});
     char text[96];
     std::snprintf(text, sizeof text, "%.0f k splats, %.2f dB on training photos",
-                  static_cast<double>(engine_->count()) * 1e-3, psnr);
+                  static_cast<double>(count()) * 1e-3, psnr);
     note_ = text;
     tally_.window_error = 0;
     tally_.window_values = 0;
@@ -215,6 +228,7 @@ class SplatFitter {
       TakeSums();
       engine_->ReadState([this](SplatFitState* state) {
         state->step = step_;
+        state->frozen = frozen_;
         state->tally = tally_;
         hooks_.checkpoint(*state);
       });
@@ -231,19 +245,21 @@ class SplatFitter {
 
   static constexpr float kUsualSteps = 15000;  // fits of fewer take larger ones
   static constexpr int kWindow = 50;           // steps
+  static constexpr int kManyPhotos = 64;       // of which one sees a small part of the splats
   static constexpr float kDepthFall = 0.01f;   // of the weight of depths, over a fit
   static constexpr double kCheckpointSeconds = 60;
 
-  const std::vector<TrainingView>& views_;
+  const SplatPhotos& photos_;
+  const std::vector<TrainingView>* views_;
+  SplatHold hold_;
   SceneBox box_;
   SplatFitOptions options_;
   SplatFitHooks hooks_;
-  SplatPhotos photos_;
   std::optional<SplatPhotos> small_;
   std::unique_ptr<SplatEngine> engine_;
   Vec3f middle_;  // of the cameras
   float extent_ = 1;
-  int64_t most_ = 0;
+  int64_t most_ = 0, frozen_ = 0;
   int step_ = 0, round_ = -1;
   std::vector<int> order_;
   SplatFitTally tally_;
@@ -256,7 +272,24 @@ class SplatFitter {
 SplatFitResult FitSplats(const std::vector<TrainingView>& views, const SceneBox& box,
                          const SplatFitOptions& options, const SplatFitHooks& hooks,
                          Backend backend) {
-  return SplatFitter(views, box, options, hooks, backend).Run();
+  const SplatPhotos photos(views);
+  return SplatFitter(photos, &views, {}, box, options, hooks, backend).Run();
+}
+
+SplatFitState RefinementOf(Splats splats, int64_t frozen) {
+  SplatFitState state;
+  state.first_moment = Splats(splats.count(), splats.basis);
+  state.second_moment = state.first_moment;
+  state.splats = std::move(splats);
+  state.frozen = frozen;
+  return state;
+}
+
+SplatFitResult RefineSplats(const SplatPhotos& photos, const SplatHold& hold,
+                            const SceneBox& box, const SplatFitOptions& options,
+                            const SplatFitHooks& hooks, Backend backend) {
+  REGRADE_CHECK(hooks.resume != nullptr);
+  return SplatFitter(photos, nullptr, hold, box, options, hooks, backend).Run();
 }
 
 }  // namespace regrade

@@ -7,10 +7,12 @@
 
 #include "kernels/base/progress.h"
 #include "kernels/device/backend.h"
+#include "kernels/splats/splat_update.h"
 #include "kernels/splats/splats.h"
 #include "reconstruct/fit/training_rays.h"
 #include "reconstruct/scene/scene_box.h"
 #include "reconstruct/splats/splat_fit_options.h"
+#include "reconstruct/splats/splat_photos.h"
 
 namespace regrade {
 
@@ -33,6 +35,7 @@ struct SplatFitTally {
 // Everything needed to resume a fit with the same result as without a stop.
 struct SplatFitState {
   Splats splats, first_moment, second_moment;
+  int64_t frozen = 0;  // the first ones, which the fit does not change
   int step = 0;
   SplatFitTally tally;
 };
@@ -64,5 +67,15 @@ struct SplatFitHooks {
 SplatFitResult FitSplats(const std::vector<TrainingView>& views, const SceneBox& box,
                          const SplatFitOptions& options, const SplatFitHooks& hooks,
                          Backend backend = Backend::kCpu);
+
+// The state of a fit that goes on from splats, of which the first `frozen` stay as they are.
+SplatFitState RefinementOf(Splats splats, int64_t frozen);
+
+// Goes on from the state hooks.resume, with the photos at their size from the first step on;
+// other splats than the frozen ones are held in `hold`. Limits of their number are without
+// those. Otherwise as FitSplats.
+SplatFitResult RefineSplats(const SplatPhotos& photos, const SplatHold& hold,
+                            const SceneBox& box, const SplatFitOptions& options,
+                            const SplatFitHooks& hooks, Backend backend = Backend::kCpu);
 
 }  // namespace regrade

@@ -78,4 +78,12 @@ PopulationChange Grow(const std::vector<float>& opacity_logits, int64_t more, ui
   return change;
 }
 
+PopulationChange Behind(int64_t before, PopulationChange change) {
+  const int32_t by = static_cast<int32_t>(before);
+  for (CopiedSplat& copied : change.copied) copied.index += by;
+  for (SplatCopy& copy : change.copies) copy.from += by, copy.to += by;
+  change.count += before;
+  return change;
+}
+
 }  // namespace regrade

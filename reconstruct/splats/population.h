@@ -17,4 +17,7 @@ PopulationChange MoveDead(const std::vector<float>& opacity_logits, uint64_t see
 PopulationChange Grow(const std::vector<float>& opacity_logits, int64_t more, uint64_t seed,
                       uint64_t step);
 
+// The same of splats that stand behind `before` others.
+PopulationChange Behind(int64_t before, PopulationChange change);
+
 }  // namespace regrade

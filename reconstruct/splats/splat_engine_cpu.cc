@@ -57,11 +57,13 @@ class CpuSplatEngine : public SplatEngine {
                           PointersOf(&state_.second_moment)};
     std::atomic<int64_t> rejected = 0;
     ForEachGradient(
-        frame_, tile_sums_, [&](int64_t i, const Splat<float>& d, const float* d_sh) {
+        frame_, tile_sums_,
+        [&](int64_t i, const Splat<float>& d, const float* d_sh) {
           const bool sound = UpdateShape(step.update, i, d, to) &
                              UpdateColors(step.update, i, frame_.splats.basis, d_sh, to);
           rejected += !sound;
-        });
+        },
+        step.update.frozen);
     sums_.picture.absolute += sums.absolute;
     sums_.picture.squared += sums.squared;
     sums_.picture.similarity += sums.similarity;

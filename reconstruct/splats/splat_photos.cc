@@ -51,22 +51,24 @@ std::vector<SeenDepth> DepthsOf(const std::vector<SeenPoint>& points, const Spla
 }  // namespace
 
 SplatPhotos::SplatPhotos(const std::vector<TrainingView>& views, double shrink) {
-  REGRADE_CHECK(!views.empty() && shrink >= 1);
-  for (const TrainingView& view : views) {
-    REGRADE_CHECK(!view.camera.ndc.on() && view.photo->channels == 3);
-    const auto smaller = [&](int side) {
-      return std::max(1, static_cast<int>(std::lround(side / shrink)));
-    };
-    Image photo = UndistortPhoto(*view.photo, view.camera);
-    const int width = smaller(photo.width), height = smaller(photo.height);
-    photo = Resize(photo, width, height);
-    if (!HasColor(photo))
-      throw Error(ExitCode::kInput,
-                  Concat("view ", photos_.size(), " has no unmasked pixel to fit"), "",
-                  "check its mask");
-    photos_.push_back(Stored(photo, view.camera.Undistorted().Resized(width, height)));
-    photos_.back().depths = DepthsOf(view.points, photos_.back());
-  }
+  REGRADE_CHECK(!views.empty());
+  for (const TrainingView& view : views) Add(view, shrink);
+}
+
+void SplatPhotos::Add(const TrainingView& view, double shrink) {
+  REGRADE_CHECK(shrink >= 1 && !view.camera.ndc.on() && view.photo->channels == 3);
+  const auto smaller = [&](int side) {
+    return std::max(1, static_cast<int>(std::lround(side / shrink)));
+  };
+  Image photo = UndistortPhoto(*view.photo, view.camera);
+  const int width = smaller(photo.width), height = smaller(photo.height);
+  photo = Resize(photo, width, height);
+  if (!HasColor(photo))
+    throw Error(ExitCode::kInput,
+                Concat("view ", photos_.size(), " has no unmasked pixel to fit"), "",
+                "check its mask");
+  photos_.push_back(Stored(photo, view.camera.Undistorted().Resized(width, height)));
+  photos_.back().depths = DepthsOf(view.points, photos_.back());
 }
 
 int64_t SplatPhotos::num_pixels() const {

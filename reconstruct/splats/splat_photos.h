@@ -24,7 +24,10 @@ class SplatPhotos {
   // Undistorts what has a lens; `shrink`: sizes are divided by it. Pixels that are not finite
   // are masked, and a smaller pixel is if one of those that it covers is. Throws Error(kInput)
   // for a photo without an unmasked pixel, Error(kUsage) for cameras in device coordinates.
-  SplatPhotos(const std::vector<TrainingView>& views, double shrink = 1);
+  explicit SplatPhotos(const std::vector<TrainingView>& views, double shrink = 1);
+  SplatPhotos() = default;
+  // One more; the view's photo need not stay. Throws as the constructor.
+  void Add(const TrainingView& view, double shrink = 1);
 
   int count() const { return static_cast<int>(photos_.size()); }
   const SplatPhoto& operator[](int i) const { return photos_[static_cast<size_t>(i)]; }

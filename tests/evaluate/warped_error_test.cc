@@ -28,7 +28,7 @@ double SquaredDistance(const Image& a, const Image& b) { return *MeanSquaredErro
 
 TEST(SoftmaxSplat, MovesByWholePixelsExactly) {
   const Image image = NoiseImage(16, 12, 1), black(16, 12, 3);
-  const SplatFrame moved =
+  const MovedFrame moved =
       SoftmaxSplat(image, black, black, ConstantFlow(16, 12, 3, -2), 1, 1, 0);
   for (int y = 0; y < 12; ++y)
     for (int x = 0; x < 16; ++x) {
@@ -46,7 +46,7 @@ TEST(SoftmaxSplat, WherePixelsMeetTheBetterOneIsSeen) {
   second.pixels = {0.5f, 0.8f};
   FlowField flow(2, 1);
   flow.uv = {1, 0, 0, 0};
-  const SplatFrame moved = SoftmaxSplat(first, first, second, flow, 1, 1, 0);
+  const MovedFrame moved = SoftmaxSplat(first, first, second, flow, 1, 1, 0);
   const double little = std::exp(-10.0);  // 0.6 of 255 is far beyond the bound
   EXPECT_NEAR(moved.color.pixels[1], (0.8 + 0.2 * little) / (1 + little), 1e-6);
   EXPECT_EQ(moved.weight.pixels[0], 0);
@@ -60,7 +60,7 @@ TEST(SoftmaxSplat, UnknownAndHugeMotionMovesNothing) {
   flow.at(2, 2)[1] = 1e30f;
   flow.at(3, 3)[0] = -1e9f;
   const Image black(4, 4, 3);
-  const SplatFrame moved = SoftmaxSplat(image, black, black, flow, 1, 1, 0);
+  const MovedFrame moved = SoftmaxSplat(image, black, black, flow, 1, 1, 0);
   for (const int at : {0, 1, 2, 3}) EXPECT_EQ(*moved.weight.at(at, at), 0) << at;
   EXPECT_EQ(*moved.weight.at(2, 1), 1);
 }

@@ -8,13 +8,18 @@
 #include <cmath>
 
 #include "kernels/base/error.h"
+#include "kernels/base/random.h"
 #include "kernels/synthetic/ray_trace.h"
+#include "kernels/synthetic/solid_index.h"
 #include "tests/support/threads.h"
 
 namespace regrade {
 namespace {
 
-constexpr const char* kScenes[] = {"table", "wall", "room", "square"};
+constexpr const char* kScenes[] = {"table", "wall", "room", "square", "street"};
+
+// So many that neighbours overlap.
+int ManyViews(const std::string& scene) { return scene == "street" ? 400 : 24; }
 
 double Bilinear(const Image& image, double u, double v, int channel) {
   const double x = u - 0.5, y = v - 0.5;
@@ -79,7 +84,7 @@ TEST_P(EveryScene, BoundsContainAllThatCamerasSee) {
 
 TEST_P(EveryScene, DepthAgreesWithTheMotion) {
   const SyntheticScene scene = MakeSyntheticScene(GetParam(), 0);
-  const std::vector<Camera> cameras = SyntheticCameras(scene, 24, 80, 60);
+  const std::vector<Camera> cameras = SyntheticCameras(scene, ManyViews(GetParam()), 80, 60);
   const SyntheticView view = RenderSyntheticView(scene, cameras[2]);
   const SyntheticMotion motion = TrueMotion(scene, cameras[2], cameras[3]);
   const RigidTransform world_from_camera = cameras[2].camera_from_world.Inverse();
@@ -101,7 +106,7 @@ TEST_P(EveryScene, DepthAgreesWithTheMotion) {
 // differ.
 TEST_P(EveryScene, H124_WarpingByTrueMotionLeavesInterpolationErrorOnly) {
   const SyntheticScene scene = MakeSyntheticScene(GetParam(), 0);
-  const std::vector<Camera> cameras = SyntheticCameras(scene, 24, 320, 240);
+  const std::vector<Camera> cameras = SyntheticCameras(scene, ManyViews(GetParam()), 320, 240);
   for (const int i : {0, 9}) {
     const SyntheticView a = RenderSyntheticView(scene, cameras[i]);
     const SyntheticView b = RenderSyntheticView(scene, cameras[i + 1]);
@@ -129,6 +134,70 @@ TEST_P(EveryScene, H124_WarpingByTrueMotionLeavesInterpolationErrorOnly) {
     // interpolation between different pixel grids may be off by a third of the contrast.
     EXPECT_GT(psnr, 30) << "views " << i << ", " << i + 1;
     EXPECT_LT(static_cast<double>(wrong) / count, 0.005);
+  }
+}
+
+// The index leaves out only what rays miss: rays between random places, along the axes, and
+// from surfaces to the sun.
+TEST_P(EveryScene, IndexFindsTheSameHitsAsATestOfAllSolids) {
+  const SyntheticScene scene = MakeSyntheticScene(GetParam(), 0);
+  const SolidIndex index(scene.solids);
+  uint64_t draws = 0;
+  const auto number = [&] { return 2 * RandomDouble(5, 0, ++draws) - 1; };
+  const Vec3d extent = GetParam() == std::string("street") ? Vec3d{150, 14, 9} : Vec3d{2, 2, 2};
+  int hits = 0, shadows = 0;
+  for (int i = 0; i < 3000; ++i) {
+    RayT<double> ray;
+    for (int a = 0; a < 3; ++a) ray.origin[a] = extent[a] * number();
+    for (int a = 0; a < 3; ++a) ray.direction[a] = number();
+    if (i % 4 == 0) ray.direction[i % 3] = 0;
+    if (i % 16 == 0) ray.direction[(i + 1) % 3] = 0;
+    ray.direction = Normalized(ray.direction);
+    const Hit hit = index.FindHit(ray, 1e-7), plain = FindHit(scene.solids, ray, 1e-7);
+    ASSERT_EQ(hit.solid, plain.solid);
+    ASSERT_EQ(hit.distance, plain.distance);
+    ASSERT_EQ(hit.point, plain.point);
+    ASSERT_EQ(hit.normal, plain.normal);
+    ASSERT_EQ(hit.u, plain.u);
+    ASSERT_EQ(hit.v, plain.v);
+    if (hit.solid < 0) continue;
+    const RayT<double> to_sun = {hit.point + hit.normal * 1e-7, scene.to_sun};
+    const bool shadowed = IsShadowed(scene.solids, to_sun, 1e-7);
+    ASSERT_EQ(index.IsShadowed(to_sun, 1e-7), shadowed);
+    const std::vector<int> found = index.ThoseInReach(hit.point);
+    ASSERT_TRUE(std::ranges::is_sorted(found));
+    for (size_t s = 0; s < scene.solids.size(); ++s)
+      ASSERT_TRUE(Norm(scene.solids[s].center - hit.point) > ContactReach(scene.solids[s]) ||
+                  std::ranges::binary_search(found, static_cast<int>(s)));
+    ++hits;
+    shadows += shadowed;
+  }
+  EXPECT_GT(hits, 500);
+  EXPECT_GT(shadows, 100);
+}
+
+// From a point to the solid, 0 inside it; from a sphere's surface, as the dome has all inside.
+double DistanceTo(const Solid& solid, const Vec3d& point) {
+  const Vec3d offset = point - solid.center;
+  if (solid.shape == Shape::kSphere) return std::abs(Norm(offset) - solid.half.x);
+  const Vec3d local = {solid.cos_yaw * offset.x + solid.sin_yaw * offset.y,
+                       solid.cos_yaw * offset.y - solid.sin_yaw * offset.x, offset.z};
+  Vec3d beyond;
+  for (int a = 0; a < 3; ++a) beyond[a] = std::max(0.0, std::abs(local[a]) - solid.half[a]);
+  if (solid.shape == Shape::kCylinder)
+    beyond = {std::max(0.0, std::hypot(local.x, local.y) - solid.half.x), 0, beyond.z};
+  return Norm(beyond);
+}
+
+TEST(SyntheticScene, CamerasOfTheStreetAreClearAndNearTheirNeighbours) {
+  const SyntheticScene scene = MakeSyntheticScene("street", 0);
+  const std::vector<Camera> cameras = SyntheticCameras(scene, 400, 800, 600);
+  for (size_t i = 0; i < cameras.size(); ++i) {
+    const Vec3d center = cameras[i].Center();
+    for (const Solid& solid : scene.solids) ASSERT_GT(DistanceTo(solid, center), 0.8) << i;
+    const Camera& next = cameras[(i + 1) % cameras.size()];
+    EXPECT_LT(Norm(next.Center() - center), 1.7) << i;
+    EXPECT_GT(Dot(next.Forward(), cameras[i].Forward()), std::cos(4 * M_PI / 180)) << i;
   }
 }
 

@@ -105,6 +105,32 @@ TEST_F(SynthCapture, WritesPhotosAndTruth) {
   EXPECT_EQ(names, expected);
 }
 
+TEST_F(SynthCapture, WithoutFlowTheRestIsTheSame) {
+  SynthOptions options;
+  options.scene = "street";
+  options.views = 4;
+  options.size = "32x24";
+  WriteSyntheticCapture((root_ / "with").string(), options);
+  options.flow = false;
+  WriteSyntheticCapture((root_ / "without").string(), options);
+  for (const char* folder : {"truth/flow", "truth/visible"}) {
+    EXPECT_TRUE(fs::exists(root_ / "with" / folder)) << folder;
+    EXPECT_FALSE(fs::exists(root_ / "without" / folder)) << folder;
+  }
+  auto with = AllBytes(root_ / "with"), without = AllBytes(root_ / "without");
+  EXPECT_NE(without.at("truth/effects.json").find("\"flow\""), std::string::npos);
+  EXPECT_EQ(with.at("truth/effects.json").find("\"flow\""), std::string::npos);
+  std::erase_if(with, [](const auto& file) {
+    return file.first.starts_with("truth/flow/") || file.first.starts_with("truth/visible/");
+  });
+  with.erase("truth/effects.json");
+  without.erase("truth/effects.json");
+  EXPECT_EQ(with, without);
+  // Photos with and without flow are not mixed.
+  options.flow = true;
+  EXPECT_THROW(WriteSyntheticCapture((root_ / "without").string(), options), Error);
+}
+
 TEST_F(SynthCapture, TruthOnDiskIsThatOfTheScene) {
   const fs::path out = Write("a");
   const SyntheticScene scene = MakeSyntheticScene("table", 0);

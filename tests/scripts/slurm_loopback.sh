@@ -1,15 +1,16 @@
 #!/usr/bin/env bash
-# Runs scripts/cluster under a real Slurm, two nodes of one core on this machine, and kills a part of a film while it renders.
+# Runs scripts/cluster under a real Slurm, two nodes of one core on this machine, with a field in two blocks, and kills a part
+# of a film while it renders.
 #
 #   slurm_loopback.sh REGRADE [PHOTOS]
 #
-# PHOTOS: what `regrade run` takes; a small synthetic capture without it. As root, with Debian's slurm-wlm, munge and snakemake.
+# PHOTOS: what `regrade run` takes; a small synthetic street without it. As root, with Debian's slurm-wlm, munge and snakemake.
 # Exit status: 0 if both styles have film and report, the killed job was tried again, and the film has the bytes of one that
 # `regrade render` makes alone; 77 without Slurm.
 set -euo pipefail
 
 if [[ $# -lt 1 || $1 == --help ]]; then
-  sed -n '2,9s/^# \{0,1\}//p' "${BASH_SOURCE[0]}"
+  sed -n '2,10s/^# \{0,1\}//p' "${BASH_SOURCE[0]}"
   exit 0
 fi
 regrade=$(realpath "$1")
@@ -52,7 +53,7 @@ sinfo
 
 photos=${2:-}
 if [[ -z $photos ]]; then
-  "$regrade" synth "$work/capture" --scene table --views 12 --size 200x150 >/dev/null
+  "$regrade" synth "$work/capture" --scene street --views 40 --size 200x150 --no-flow >/dev/null
   photos=$work/capture/truth
 fi
 mkdir "$work/styles"
@@ -60,7 +61,8 @@ cp "$root"/assets/style_{night,autumn}.png "$work/styles"
 cd "$root/scripts/cluster"
 film="--film-seconds 8 --film-size 320"
 snakemake --profile "$root/scripts/slurm" --config regrade="$regrade" photos="$(realpath "$photos")" styles="$work/styles" out="$work/out" \
-  parts=3 threads=1 memory_mb=2000 scene="--preset draft --photo-size 200 --splat-steps 300" style="--style-steps 40" film="$film" \
+  parts=3 threads=1 memory_mb=2000 scene="--preset draft --photo-size 200 --splat-steps 300" blocks=2 \
+  refine="--splats 40 --splat-steps 600 --photo-size 200" style="--style-steps 40" film="$film" \
   >"$work/log" 2>&1 &
 workflow=$!
 

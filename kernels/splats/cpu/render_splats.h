@@ -25,12 +25,14 @@ struct SplatTileSums {
 void SumOverTiles(const SplatFrame& frame, const SplatPicture<float>& d_picture,
                   SplatTileSums* sums, const SplatTileFunctions& tiles = SplatTiles());
 
-// Calls use(index, d, d_sh [3, basis]) with the gradient by each splat, in parallel; 0 by those
-// that are not seen. The tiles of a splat are summed in double, in their order.
+// Calls use(index, d, d_sh [3, basis]) with the gradient by each splat from `first` on, in
+// parallel; 0 by those that are not seen. The tiles of a splat are summed in double, in their
+// order.
 template <typename Use>
-void ForEachGradient(const SplatFrame& frame, const SplatTileSums& sums, const Use& use) {
+void ForEachGradient(const SplatFrame& frame, const SplatTileSums& sums, const Use& use,
+                     int64_t first = 0) {
 #pragma omp parallel for schedule(static)
-  for (int64_t i = 0; i < frame.splats.count; ++i) {
+  for (int64_t i = first; i < frame.splats.count; ++i) {
     const size_t at = static_cast<size_t>(i);
     Splat<float> d{};
     float d_sh[3 * kMaxBasis] = {};

@@ -28,10 +28,11 @@ struct UpdateUse {
   uint32_t* rejected;
 
   __device__ void Shape(int64_t i, const Splat<float>& d) const {
-    if (!UpdateShape(update, i, d, to)) atomicAdd(rejected, 1u);
+    if (i >= update.frozen && !UpdateShape(update, i, d, to)) atomicAdd(rejected, 1u);
   }
   template <int kCount>
   __device__ void Color(int64_t at, int k, const float* d) const {
+    if (at < 3 * basis * update.frozen) return;
 #pragma unroll
     for (int p = 0; p < kCount; ++p)
       if (!UpdateColor(update, (k + p) % basis == 0, d[p], at + p, to)) atomicAdd(rejected, 1u);
@@ -41,13 +42,15 @@ struct UpdateUse {
 __global__ void UnseenShapesKernel(SplatUpdate update, SplatMoments to,
                                    const int32_t* num_tiles, int64_t count) {
   const int64_t i = blockIdx.x * static_cast<int64_t>(blockDim.x) + threadIdx.x;
-  if (i < count && num_tiles[i] == 0) UpdateShape(update, i, {}, to);
+  if (i >= update.frozen && i < count && num_tiles[i] == 0) UpdateShape(update, i, {}, to);
 }
 
 __global__ void UnseenColorsKernel(SplatUpdate update, SplatMoments to,
                                    const int32_t* num_tiles, int64_t count, int basis) {
   const int64_t k = blockIdx.x * static_cast<int64_t>(blockDim.x) + threadIdx.x;
-  if (k >= 3 * basis * count || num_tiles[k / (3 * basis)] != 0) return;
+  if (k < 3 * basis * update.frozen || k >= 3 * basis * count ||
+      num_tiles[k / (3 * basis)] != 0)
+    return;
   UpdateColor(update, k % basis == 0, 0, k, to);
 }
 

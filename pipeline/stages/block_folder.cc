@@ -1,0 +1,155 @@
+#include "pipeline/stages/block_folder.h"
+
+#include <filesystem>
+
+#include "kernels/base/error.h"
+#include "kernels/base/hash.h"
+#include "pipeline/files/atomic_file.h"
+#include "pipeline/files/text.h"
+#include "pipeline/report/stage_metrics.h"
+#include "pipeline/workspace/folder_lock.h"
+#include "pipeline/workspace/metrics_json.h"
+#include "pipeline/workspace/output_names.h"
+
+namespace regrade {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr char kField[] = "field.npz", kInputs[] = "inputs.json", kCoarse[] = "coarse.npz",
+               kPlan[] = "plan.json";
+constexpr uint64_t kMostField = uint64_t{64} << 30;
+
+StageRecord RecordOf(const RunContext& context) {
+  std::optional<StageRecord> record = context.workspace->Find("reconstruct");
+  if (!record)
+    throw InputError("stage reconstruct has not been done here", context.workspace->folder(),
+                     "run `regrade reconstruct` first: its field is what is refined");
+  return *std::move(record);
+}
+
+std::string FieldHash(const RunContext& context) {
+  const StageRecord record = RecordOf(context);
+  for (const StageOutput& output : record.outputs)
+    if (output.path == kField) return output.hash;
+  throw InputError("the record of stage reconstruct names no field",
+                   context.workspace->folder(), "run `regrade reconstruct` again");
+}
+
+// Several processes may write the same file at the same moment: the last one wins, whole.
+void WriteBesideOthers(const std::string& path, const JsonValue& value) {
+  const std::string made = OwnTemporary(path);
+  WriteJsonFile(made, value);
+  RenameDurably(made, path);
+}
+
+// A link where the file system has them.
+void CopyFile(const std::string& from, const std::string& to) {
+  const std::string made = OwnTemporary(to);
+  std::error_code error;
+  fs::remove(made, error);
+  fs::create_hard_link(from, made, error);
+  if (error) WriteFileAtomically(made, ReadWholeFile(from, kMostField));
+  RenameDurably(made, to);
+}
+
+}  // namespace
+
+BlockFolder::BlockFolder(const RunContext& context, int blocks)
+    : root_(context.workspace->Path(kBlocksFolder)),
+      field_(context.workspace->Path(kField)),
+      blocks_(blocks) {
+  const RunSettings& settings = context.settings;
+  inputs_ = JsonValue::Object{
+      {"poses", context.ResultOf("pose")},        {"blocks", blocks},
+      {"splats", OptionValues(settings.splats)},  {"photo-size", settings.scene.photo_size},
+      {"holdout", settings.run.holdout},          {"seed", settings.run.seed},
+      {"reproducible", settings.run.reproducible}};
+  settings_ = HashText(HashOf(DumpJson(inputs_, -1)));
+  const ReconstructReport made = MetricsFromJson<ReconstructReport>(RecordOf(context).metrics);
+  joined_ = made.refined && made.refined->settings == settings_;
+  inputs_["field"] = FieldHash(context);
+  path_ = root_ + "/" + HashText(HashOf(DumpJson(inputs_, -1)));
+}
+
+std::string BlockFolder::FieldPath(int block) const {
+  return Path(Format("%05d.npz", block + 1));
+}
+
+std::optional<BlockRecord> BlockFolder::Find(int block) const {
+  const std::string record = Path(Format("%05d.json", block + 1));
+  if (!fs::exists(record)) return std::nullopt;
+  return MetricsFromJson<BlockRecord>(ReadJsonFile(record));
+}
+
+std::vector<int> BlockFolder::Missing() const {
+  std::vector<int> missing;
+  for (int block = 0; block < blocks_; ++block)
+    if (!Find(block)) missing.push_back(block);
+  return missing;
+}
+
+void BlockFolder::Begin() const {
+  MakeFolder(path_);
+  if (!fs::exists(Path(kCoarse))) CopyFile(field_, Path(kCoarse));
+  if (!fs::exists(Path(kInputs))) WriteBesideOthers(Path(kInputs), inputs_);
+}
+
+std::optional<BlockPlan> BlockFolder::Plan() const {
+  if (!fs::exists(Path(kPlan))) return std::nullopt;
+  BlockPlan plan = PlanFromJson(ReadJsonFile(Path(kPlan)));
+  if (std::ssize(plan.blocks) != blocks_)
+    throw InputError("is not a plan of " + Counted(blocks_, "block"), Path(kPlan),
+                     "remove this folder");
+  return plan;
+}
+
+BlockPlan BlockFolder::KeepPlan(const BlockPlan& plan) const {
+  const std::string made = OwnTemporary(Path(kPlan));
+  WriteJsonFile(made, PlanToJson(plan));
+  // A link is made where there is none yet, and otherwise not.
+  std::error_code error;
+  fs::create_hard_link(made, Path(kPlan), error);
+  if (error && !fs::exists(Path(kPlan))) fs::rename(made, Path(kPlan));
+  fs::remove(made, error);
+  return *Plan();
+}
+
+void BlockFolder::Record(int block, const BlockRecord& record) const {
+  WriteBesideOthers(Path(Format("%05d.json", block + 1)), MetricsToJson(record));
+}
+
+// Under another name first: what is half removed is no block.
+void BlockFolder::Drop() const {
+  const std::string gone = OwnTemporary(path_);
+  std::error_code error;
+  fs::rename(path_, gone, error);
+  fs::remove_all(gone, error);
+  fs::remove(root_, error);  // if it is empty
+}
+
+void RepairField(const RunContext& context) {
+  const std::string field = context.workspace->Path(kField), hash = FieldHash(context);
+  if (fs::exists(field) && HashFile(field) == hash) return;
+  std::error_code error;
+  for (const auto& entry :
+       fs::directory_iterator(context.workspace->Path(kBlocksFolder), error)) {
+    const fs::path coarse = entry.path() / kCoarse;
+    if (!fs::exists(coarse) || HashFile(coarse.string()) != hash) continue;
+    CopyFile(coarse.string(), field);
+    return context.console->Info("the field is again what it was before it was joined");
+  }
+}
+
+std::string BlocksText(std::vector<int> blocks, int all) {
+  constexpr size_t kNamed = 8;
+  std::vector<std::string> names;
+  for (const int block : blocks) names.push_back(std::to_string(block + 1));
+  if (names.size() > kNamed) {
+    names.resize(kNamed);
+    names.push_back("...");
+  }
+  return Concat(blocks.size() == 1 ? "block " : "blocks ", Join(names, ", "), " of ", all);
+}
+
+}  // namespace regrade

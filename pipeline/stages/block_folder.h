@@ -1,0 +1,84 @@
+// The files of a field that is refined in blocks: DIR/blocks/HASH/, HASH being that of what the
+// blocks are made of.
+//
+//   inputs.json  that
+//   coarse.npz   the field that is refined
+//   plan.json    see PlanBlocks; of whoever came first, and the same for all
+//   00001.npz    splats of block 1 of 1, 2, ..., those that it keeps; a field file
+//   00001.json   BlockRecord of it, which is written last
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "pipeline/run/run_context.h"
+#include "pipeline/stages/block_plan.h"
+
+namespace regrade {
+
+struct BlockRecord {
+  std::string device;
+  double seconds = 0;
+  double peak_memory_gb = 0;  // of the process, 10^9 bytes
+  int photos = 0;
+  int64_t splats = 0;  // kept
+  int64_t pixels = 0;  // compared, over all steps
+  int64_t rejected = 0;
+  Metric psnr_train_db;
+
+  template <typename Visit>
+  void Describe(Visit& visit) {
+    visit("device", device);
+    visit("seconds", seconds);
+    visit("peak_memory_gb", peak_memory_gb);
+    visit("photos", photos);
+    visit("splats", splats);
+    visit("pixels", pixels);
+    visit("rejected", rejected);
+    visit("psnr_train_db", psnr_train_db);
+  }
+};
+
+class BlockFolder {
+ public:
+  // Of the run's field and settings. Makes nothing. Throws Error(kInput) where the run has no
+  // field of splats, or it was changed.
+  BlockFolder(const RunContext& context, int blocks);
+
+  const JsonValue& inputs() const { return inputs_; }
+  // Of all of them but the field.
+  const std::string& settings() const { return settings_; }
+  // Was the run's field made by these settings?
+  bool IsJoined() const { return joined_; }
+  const std::string& path() const { return path_; }
+  int blocks() const { return blocks_; }
+  std::string Path(const std::string& name) const { return path_ + "/" + name; }
+  std::string FieldPath(int block) const;  // block: from 0 on
+  std::optional<BlockRecord> Find(int block) const;
+  std::vector<int> Missing() const;
+
+  // Makes the folder with inputs and the field, where they are missing.
+  void Begin() const;
+  // Of whoever wrote it first; empty before.
+  std::optional<BlockPlan> Plan() const;
+  BlockPlan KeepPlan(const BlockPlan& plan) const;
+  void Record(int block, const BlockRecord& record) const;
+  // Removes it all, once the field is made.
+  void Drop() const;
+
+ private:
+  std::string root_, path_, field_, settings_;
+  int blocks_;
+  bool joined_ = false;
+  JsonValue inputs_;
+};
+
+// Where joining was interrupted after the field was replaced and before that was noted, puts
+// the field before it back.
+void RepairField(const RunContext& context);
+
+// "2, 5 and 7 of 8 blocks"; blocks count from 1 here.
+std::string BlocksText(std::vector<int> blocks, int all);
+
+}  // namespace regrade

@@ -1,0 +1,114 @@
+// Fields that are refined in blocks, by runs of the program.
+#include <gtest/gtest.h>
+
+#include <filesystem>
+
+#include "pipeline/fields/field_file.h"
+#include "pipeline/files/json_file.h"
+#include "tests/support/temporary_folder.h"
+#include "tests/support/tiny_run.h"
+
+namespace regrade {
+namespace {
+
+namespace fs = std::filesystem;
+using testing::ProgramOutcome;
+using testing::ReadText;
+using testing::Regrade;
+using testing::TemporaryFolder;
+
+class Refine : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    testing::WriteCapture(folder_ / "capture", 12, "96x72");
+    std::vector<std::string> run = {"reconstruct",   folder_ / "capture/truth",
+                                    "--out",         folder_ / "o",
+                                    "--device",      "cpu",
+                                    "--holdout",     "4",
+                                    "--seed",        "3",
+                                    "--reproducible"};
+    for (const std::string& flag : testing::TinyFlags("splats")) run.push_back(flag);
+    const ProgramOutcome made = Regrade(run);
+    ASSERT_EQ(made.code, 0) << made.text;
+  }
+
+  ProgramOutcome RefineWith(const std::vector<std::string>& more,
+                            const std::string& of = "o") const {
+    std::vector<std::string> words = {"refine",   folder_ / of, "--blocks",      "3",
+                                      "--splats", "4",          "--splat-steps", "90"};
+    words.insert(words.end(), more.begin(), more.end());
+    return Regrade(words);
+  }
+
+  JsonValue Refined(const std::string& of = "o") const {
+    return ReadJsonFile(folder_ / (of + "/.regrade/stages/reconstruct.json"))
+        .At("metrics")
+        .At("refined");
+  }
+
+  TemporaryFolder folder_;
+};
+
+TEST_F(Refine, PartsGiveTheBytesOfOneProcess) {
+  fs::copy(folder_ / "o", folder_ / "p", fs::copy_options::recursive);
+  const std::string coarse = ReadText(folder_ / "o/field.npz");
+  const ProgramOutcome whole = RefineWith({});
+  ASSERT_EQ(whole.code, 0) << whole.text;
+  EXPECT_EQ(Refined().At("blocks").AsInt(), 3);
+  EXPECT_GT(Refined().At("psnr_before_db").AsDouble(), 5);
+  EXPECT_NE(ReadText(folder_ / "o/field.npz"), coarse);
+  EXPECT_FALSE(fs::exists(folder_ / "o/blocks"));
+
+  // What waits for neighbours is made when the part is run again, and what is there is kept.
+  for (int round = 0; round < 3; ++round)
+    for (const char* part : {"1/2", "2/2"}) {
+      const ProgramOutcome some = RefineWith({"--part", part}, "p");
+      ASSERT_EQ(some.code, 0) << some.text;
+    }
+  EXPECT_EQ(ReadText(folder_ / "p/field.npz"), coarse);
+  const ProgramOutcome joined = RefineWith({"--join"}, "p");
+  ASSERT_EQ(joined.code, 0) << joined.text;
+  EXPECT_EQ(ReadText(folder_ / "p/field.npz"), ReadText(folder_ / "o/field.npz"));
+  // Given again, it does nothing.
+  const std::string refined = ReadText(folder_ / "p/field.npz");
+  for (const char* again : {"--join", "--verbose"})
+    EXPECT_EQ(RefineWith({again}, "p").code, 0) << again;
+  EXPECT_EQ(ReadText(folder_ / "p/field.npz"), refined);
+  // The stage counts as done, with the field that is there now.
+  const ProgramOutcome style =
+      Regrade({"reconstruct", folder_ / "capture/truth", "--out", folder_ / "p", "--config",
+               folder_ / "o/run.json", "--dry-run"});
+  EXPECT_EQ(style.code, 0) << style.text;
+}
+
+TEST_F(Refine, AJoinNamesWhatIsMissing) {
+  ASSERT_EQ(RefineWith({"--part", "1/3"}).code, 0);
+  const std::string coarse = ReadText(folder_ / "o/field.npz");
+  const ProgramOutcome joined = RefineWith({"--join"});
+  EXPECT_EQ(joined.code, static_cast<int>(ExitCode::kInput));
+  EXPECT_NE(joined.text.find("of 3 were not made"), std::string::npos) << joined.text;
+  EXPECT_EQ(ReadText(folder_ / "o/field.npz"), coarse);
+}
+
+TEST_F(Refine, AJoinThatWasInterruptedIsRepeated) {
+  for (int round = 0; round < 3; ++round) ASSERT_EQ(RefineWith({"--part", "1/1"}).code, 0);
+  // The field is replaced, and that is not noted yet.
+  for (const auto& entry : fs::directory_iterator(folder_ / "o/blocks"))
+    fs::copy_file(entry.path() / "00001.npz", folder_ / "o/field.npz",
+                  fs::copy_options::overwrite_existing);
+  const ProgramOutcome joined = RefineWith({"--join"});
+  ASSERT_EQ(joined.code, 0) << joined.text;
+  EXPECT_EQ(Refined().At("blocks").AsInt(), 3);
+}
+
+TEST_F(Refine, WhatCannotBeIsRefused) {
+  EXPECT_EQ(RefineWith({"--part", "4/3"}).code, static_cast<int>(ExitCode::kUsage));
+  EXPECT_EQ(RefineWith({"--part", "1/3", "--join"}).code, static_cast<int>(ExitCode::kUsage));
+  EXPECT_EQ(RefineWith({}, "nowhere").code, static_cast<int>(ExitCode::kInput));
+  EXPECT_FALSE(fs::exists(folder_ / "nowhere"));
+  EXPECT_EQ(RefineWith({"--dry-run"}).code, 0);
+  EXPECT_FALSE(fs::exists(folder_ / "o/blocks"));
+}
+
+}  // namespace
+}  // namespace regrade
