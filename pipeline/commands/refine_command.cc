@@ -40,7 +40,7 @@ bool IsReady(int block, const BlockPlan& plan, const BlockFolder& folder) {
                              [&](int before) { return folder.Find(before).has_value(); });
 }
 
-// Those blocks of the part that can be made now; says which are left.
+// Makes the part's blocks whose neighbours are there; says which are left.
 void MakeBlocks(RunContext* context, const BlockFolder& folder) {
   Console* const console = context->console;
   folder.Begin();
@@ -51,16 +51,15 @@ void MakeBlocks(RunContext* context, const BlockFolder& folder) {
   const WorkingViews views = context->Views().InField(coarse);
   console->BeginStage("refine", "refining the scene in blocks");
   const BlockPlan plan = PlanOf(*context, views, coarse, folder);
-  const std::vector<int> blocks = BlocksToMake(plan, folder, context->refine.part);
-  ProgressParts parts(console->StageProgress(), static_cast<double>(blocks.size()));
-  std::vector<int> made, left;
-  for (const int block : blocks) {
-    if (!IsReady(block, plan, folder)) {
-      left.push_back(block);
-      continue;
-    }
-    FitBlock(*context, views, coarse, folder, plan, block, parts.Next(1));
-    made.push_back(block);
+  std::vector<int> left = BlocksToMake(plan, folder, context->refine.part), made;
+  ProgressParts parts(console->StageProgress(), static_cast<double>(left.size()));
+  const auto ready = [&](int block) { return IsReady(block, plan, folder); };
+  // Others may make meanwhile what a block waits for.
+  for (auto next = std::ranges::find_if(left, ready); next != left.end();
+       next = std::ranges::find_if(left, ready)) {
+    FitBlock(*context, views, coarse, folder, plan, *next, parts.Next(1));
+    made.push_back(*next);
+    left.erase(next);
   }
   console->EndStage();
   console->Info(made.empty() ? "refine: no block could be made now"
