@@ -14,7 +14,7 @@ run() { echo "== $*"; "$@" || [[ $? == 77 ]] || failed=1; }  # 77: skipped
 
 run ctest --test-dir build/cpu --output-on-failure -j2 --timeout 36000
 run tests/scripts/slurm_loopback.sh $program
-run python3 tests/scripts/crash_recovery.py $program --kills 200 --part-kills 20 --pose-kills 10
+run python3 tests/scripts/crash_recovery.py $program --kills 200 --part-kills 20 --block-kills 20 --pose-kills 10
 run python3 tests/scripts/write_fault_injection.py $program build/cpu/tests/pipeline/libfailing_writes.so
 run python3 tests/scripts/resource_limits.py $program
 run scripts/sanitized.sh child_process_test kernels_color_test kernels_field_test kernels_network_test resize_test \

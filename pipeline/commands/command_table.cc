@@ -18,8 +18,7 @@ const std::vector<Command>& AllCommands() {
        "out preset photo-masks video-frames max-memory device restart-from dry-run verbose"},
       {"refine", "DIR [--preset NAME] [OPTIONS]",
        "fits the splats of a finished reconstruction in more detail, block by block: for "
-       "scenes "
-       "that do not fit into memory, and for several machines",
+       "scenes that do not fit into memory, and for several machines",
        RunRefine,
        "blocks part join preset splats splat-steps photo-size max-memory device dry-run "
        "verbose"},

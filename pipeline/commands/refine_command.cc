@@ -2,10 +2,13 @@
 #include <algorithm>
 
 #include "kernels/base/error.h"
+#include "pipeline/capture/effect_words.h"
 #include "pipeline/commands/command.h"
 #include "pipeline/program/device_choice.h"
+#include "pipeline/run/run_file.h"
 #include "pipeline/stages/block_fit.h"
 #include "pipeline/stages/block_join.h"
+#include "pipeline/workspace/folder_lock.h"
 
 namespace regrade {
 namespace {
@@ -40,15 +43,32 @@ bool IsReady(int block, const BlockPlan& plan, const BlockFolder& folder) {
                              [&](int before) { return folder.Find(before).has_value(); });
 }
 
+// False where another process makes it, or has.
+bool MakeBlock(const RunContext& context, const WorkingViews& views, const StoredField& coarse,
+               const BlockFolder& folder, const BlockPlan& plan, int block,
+               const ProgressFunction& progress) {
+  std::optional<FolderLock> lock;
+  try {
+    lock.emplace(folder.LockPath(block), LockUse::kAlone);
+  } catch (const Error& error) {
+    if (error.code() != ExitCode::kFolderInUse) throw;
+    context.console->Info(Concat("block ", block + 1, " is being made by another process"));
+    return false;
+  }
+  if (folder.Find(block)) return false;
+  FitBlock(context, views, coarse, folder, plan, block, progress);
+  return true;
+}
+
 // Makes the part's blocks whose neighbours are there; says which are left.
 void MakeBlocks(RunContext* context, const BlockFolder& folder) {
   Console* const console = context->console;
   folder.Begin();
   const StoredField coarse = ReadFieldFile(folder.Path("coarse.npz"));
-  if (!coarse.field.geometry->splats.on())
-    throw InputError("its field has voxels, and blocks are of splats",
-                     context->workspace->folder(), "reconstruct it with --field splats");
   const WorkingViews views = context->Views().InField(coarse);
+  if (views.capture().rendered)
+    throw InputError("its splats were given without photos to fit them to",
+                     context->workspace->folder(), "reconstruct a scene from photos");
   console->BeginStage("refine", "refining the scene in blocks");
   const BlockPlan plan = PlanOf(*context, views, coarse, folder);
   std::vector<int> left = BlocksToMake(plan, folder, context->refine.part), made;
@@ -57,9 +77,10 @@ void MakeBlocks(RunContext* context, const BlockFolder& folder) {
   // Others may make meanwhile what a block waits for.
   for (auto next = std::ranges::find_if(left, ready); next != left.end();
        next = std::ranges::find_if(left, ready)) {
-    FitBlock(*context, views, coarse, folder, plan, *next, parts.Next(1));
-    made.push_back(*next);
+    const int block = *next;
     left.erase(next);
+    if (MakeBlock(*context, views, coarse, folder, plan, block, parts.Next(1)))
+      made.push_back(block);
   }
   console->EndStage();
   console->Info(made.empty() ? "refine: no block could be made now"
@@ -74,24 +95,27 @@ void MakeBlocks(RunContext* context, const BlockFolder& folder) {
 void Refine(RunContext* context) {
   const RefineOptions& refine = context->refine;
   Console* const console = context->console;
-  if (refine.part.empty()) RepairField(*context);
+  const bool dry_run = context->settings.start.dry_run;
+  if (refine.part.empty() && !dry_run) RepairField(*context);
   const BlockFolder folder(*context, refine.blocks);
   if (folder.IsJoined()) return console->Info("refine: done before");
   const std::vector<int> missing = folder.Missing();
-  if (context->settings.start.dry_run)
+  if (dry_run)
     return console->Info(missing.empty()
                              ? "refine: no block is left to make"
                              : "refine: would make " + BlocksText(missing, folder.blocks()));
-  if (missing.empty())
+  if (missing.empty() && !refine.part.empty())
     console->Info("refine: no block is left to make");
-  else if (!refine.join)
+  else if (!missing.empty() && !refine.join)
     MakeBlocks(context, folder);
   if (!refine.part.empty()) return;
   JoinBlocks(context, folder);
-  // Later stages work at the size of the photos that the field was refined with.
-  JsonValue run = ReadJsonFile(context->workspace->Path("run.json"));
-  run["options"]["photo-size"] = context->settings.scene.photo_size;
-  WriteJsonFile(context->workspace->Path("run.json"), run);
+  const int size = context->settings.scene.photo_size;
+  const int64_t of_run =
+      ReadRunFile(context->workspace->Path("run.json")).options.At("photo-size").AsInt();
+  if (size != of_run)
+    console->Info(Concat("later commands take photos of ", of_run,
+                         " pixels from run.json: give them --photo-size ", size, ", too"));
 }
 
 }  // namespace
@@ -114,6 +138,9 @@ void RunRefine(const Command& command, const Arguments& arguments, Console* cons
   if (!prepared->run_words.empty()) context.source = prepared->run_words[0];
   settings.run.out = AbsolutePath(prepared->words[0]);
   CheckTogether(settings);
+  const auto effects = ParseEffects(settings.run.effects);
+  if (const auto view = effects.find(kViewDependence); view != effects.end() && !view->second)
+    settings.splats.sh_degree = 0;
   if (settings.start.break_lock) Workspace(settings.run.out, true);
   std::optional<Workspace> workspace;
   if (refine.part.empty())

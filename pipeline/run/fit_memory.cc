@@ -75,13 +75,15 @@ PlannedFit FitWithinMemory(FitOptions options, const FitPlace& place) {
   return fit;
 }
 
-PlannedSplatFit SplatsWithinMemory(SplatFitOptions options, const FitPlace& place) {
+PlannedSplatFit SplatsWithinMemory(SplatFitOptions options, const FitPlace& place,
+                                   int64_t there) {
   const auto plan_of = [&place](const SplatFitOptions& of) { return PlanSplatsAt(place, of); };
   PlannedSplatFit fit{AtMostOfPixels(options, place), {}, ""};
   if (MayLower(place) && LowerSplatsToMemory(plan_of, LimitOf(place), &fit.options))
     fit.notice =
         Format("the field has at most %.0f thousand splats", double{fit.options.thousands}) +
         ToFitInto(place);
+  fit.options.thousands = std::max(fit.options.thousands, static_cast<float>(there) / 1000);
   fit.plan = plan_of(fit.options);
   CheckFitsMemory(fit.plan, LimitOf(place), MemoryOf(place));
   return fit;

@@ -48,8 +48,9 @@ struct PlannedSplatFit {
 // explained one by one, and views between them get worse.
 inline constexpr int kPixelsOfSplat = 15;
 SplatFitOptions AtMostOfPixels(SplatFitOptions options, const FitPlace& place);
-// As FitWithinMemory, and first AtMostOfPixels.
-PlannedSplatFit SplatsWithinMemory(SplatFitOptions options, const FitPlace& place);
+// As FitWithinMemory, and first AtMostOfPixels; not below `there`, which the fit begins with.
+PlannedSplatFit SplatsWithinMemory(SplatFitOptions options, const FitPlace& place,
+                                   int64_t there = 0);
 
 // AdaptOptions for the place.
 FitOptions AdaptedTo(const FitOptions& options, const FitPlace& place);

@@ -21,7 +21,8 @@ struct RefineOptions {
           .max = 100000,
           .once = true});
     bind("part", part,
-         {.help = "K/N makes each N-th block from the K-th on, to blocks/ of the folder, and "
+         {.help = "K/N makes each N-th block from the K-th on, in their turns, to blocks/ of "
+                  "the folder, and "
                   "nothing else; parts may be made at the same time, on any machines that "
                   "share the folder",
           .once = true});

@@ -59,7 +59,7 @@ BlockInput ReadInput(const WorkingViews& views, const StoredField& around,
       if (!frame.box[static_cast<size_t>(i)].empty()) input.seen[static_cast<size_t>(i)] = true;
   }
   if (input.photos.count() == 0)
-    throw SceneError("the masks leave nothing of the photos of a block", "",
+    throw SceneError("the masks leave nothing of the photos that see a block", "",
                      "give fewer --blocks");
   return input;
 }
@@ -109,7 +109,7 @@ void FitBlock(const RunContext& context, const WorkingViews& views, const Stored
   const StoredField around = FieldAround(coarse, folder, plan, own);
   const RunSettings& settings = context.settings;
   Console* const console = context.console;
-  const std::string stage = Concat("block-", block + 1);
+  const std::string stage = BlockStage(block);
   const Backend backend = ChooseBackend(settings.run.device, settings.run.reproducible);
   ProgressParts parts(progress, 0.05 + 1);
   const BlockInput input = ReadInput(views, around, plan.views[own], console, parts.Next(0.05));
@@ -128,8 +128,7 @@ void FitBlock(const RunContext& context, const WorkingViews& views, const Stored
   const double part_of_photos =
       static_cast<double>(input.photos.count()) / static_cast<double>(views.Training().size());
   options.steps = std::max(1, static_cast<int>(std::lround(options.steps * part_of_photos)));
-  options.thousands = std::max(options.thousands * static_cast<float>(space.share),
-                               static_cast<float>(start.count() - frozen) / 1000);
+  options.thousands *= static_cast<float>(space.share);
   options.seed = settings.run.seed + static_cast<uint64_t>(block);
   const FitPlace place{.backend = backend,
                        .pixels = input.photos.num_pixels(),
@@ -137,13 +136,15 @@ void FitBlock(const RunContext& context, const WorkingViews& views, const Stored
                        .box = BoxOf(around),
                        .max_memory_gb = settings.run.max_memory_gb,
                        .reproducible = settings.run.reproducible,
-                       .frozen_splats = frozen,
+                       // And the field, twice, which is a third of what a fit has of a splat.
+                       .frozen_splats = frozen + splats.count * 2 / 3,
                        .is_block = true};
-  const PlannedSplatFit fit = SplatsWithinMemory(options, place);
+  const PlannedSplatFit fit = SplatsWithinMemory(options, place, start.count() - frozen);
   console->Info(Concat("block ", block + 1, ": ", Counted(input.photos.count(), "photo"), ", ",
                        Format("%.0f", double{fit.options.thousands}), " thousand splats among ",
                        frozen, " of others, ", PlanText(fit.plan)));
-  if (!fit.notice.empty()) console->Info(fit.notice + "; more --blocks would leave it more");
+  if (!fit.notice.empty())
+    console->Info(fit.notice + "; with more --blocks each may have more");
 
   SplatFitState state = RefinementOf(std::move(start), frozen);
   std::string note;

@@ -65,8 +65,17 @@ BlockFolder::BlockFolder(const RunContext& context, int blocks)
       {"splats", OptionValues(settings.splats)},  {"photo-size", settings.scene.photo_size},
       {"holdout", settings.run.holdout},          {"seed", settings.run.seed},
       {"reproducible", settings.run.reproducible}};
+  if (settings.run.reproducible) inputs_["max-memory"] = settings.run.max_memory_gb;
+  const StageRecord record = RecordOf(context);
+  const JsonValue* const holdout = record.inputs.Find("holdout");
+  if (holdout != nullptr && !(*holdout == JsonValue(settings.run.holdout)))
+    throw UsageError(Concat("the field was fitted with ", holdout->AsInt()), "--holdout",
+                     "leave it out: photos that were held out stay so");
   settings_ = HashText(HashOf(DumpJson(inputs_, -1)));
-  const ReconstructReport made = MetricsFromJson<ReconstructReport>(RecordOf(context).metrics);
+  const ReconstructReport made = MetricsFromJson<ReconstructReport>(record.metrics);
+  if (!made.splats)
+    throw InputError("its field has voxels, and blocks are of splats",
+                     context.workspace->folder(), "reconstruct it with --field splats");
   joined_ = made.refined && made.refined->settings == settings_;
   inputs_["field"] = FieldHash(context);
   path_ = root_ + "/" + HashText(HashOf(DumpJson(inputs_, -1)));
@@ -91,7 +100,13 @@ std::vector<int> BlockFolder::Missing() const {
 
 void BlockFolder::Begin() const {
   MakeFolder(path_);
-  if (!fs::exists(Path(kCoarse))) CopyFile(field_, Path(kCoarse));
+  if (!fs::exists(Path(kCoarse))) {
+    if (HashFile(field_) != inputs_.At("field").AsString())
+      throw InputError("is not what stage reconstruct made", field_,
+                       "run `regrade refine` without --part, which repairs what a kill left "
+                       "half done, or `regrade reconstruct` again");
+    CopyFile(field_, Path(kCoarse));
+  }
   if (!fs::exists(Path(kInputs))) WriteBesideOthers(Path(kInputs), inputs_);
 }
 
@@ -139,6 +154,8 @@ void RepairField(const RunContext& context) {
     CopyFile(coarse.string(), field);
     return context.console->Info("the field is again what it was before it was joined");
   }
+  throw InputError("is not what stage reconstruct made", field,
+                   "run `regrade reconstruct` again");
 }
 
 std::string BlocksText(std::vector<int> blocks, int all) {

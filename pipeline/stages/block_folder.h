@@ -55,6 +55,8 @@ class BlockFolder {
   int blocks() const { return blocks_; }
   std::string Path(const std::string& name) const { return path_ + "/" + name; }
   std::string FieldPath(int block) const;  // block: from 0 on
+  // Of who makes it, so that nobody else does at the same time.
+  std::string LockPath(int block) const { return FieldPath(block) + ".lock"; }
   std::optional<BlockRecord> Find(int block) const;
   std::vector<int> Missing() const;
 
@@ -74,8 +76,11 @@ class BlockFolder {
   JsonValue inputs_;
 };
 
+// The name of its checkpoints.
+inline std::string BlockStage(int block) { return Concat("block-", block + 1); }
+
 // Where joining was interrupted after the field was replaced and before that was noted, puts
-// the field before it back.
+// the field before it back. Throws Error(kInput) where the field was changed otherwise.
 void RepairField(const RunContext& context);
 
 // "2, 5 and 7 of 8 blocks"; blocks count from 1 here.

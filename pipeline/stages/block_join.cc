@@ -14,6 +14,7 @@
 #include "pipeline/stages/fit_quality.h"
 #include "pipeline/stages/photo_metrics.h"
 #include "pipeline/workspace/metrics_json.h"
+#include "pipeline/workspace/style_folders.h"
 
 namespace regrade {
 namespace {
@@ -28,31 +29,34 @@ struct Joined {
 // Of each block what no later one took over.
 Joined ReadBlocks(const BlockFolder& folder, const BlockPlan& plan) {
   Joined joined;
-  double squared = 0;
+  double squared = 0, weights = 0;
   for (int block = 0; block < folder.blocks(); ++block) {
     const BlockRecord record = *folder.Find(block);
     const StoredField stored = ReadFieldFile(folder.FieldPath(block));
     const SplatsView<float> splats = SplatsOf(stored.field);
-    if (block > 0 && splats.basis != joined.splats.basis)
-      throw InputError("has another degree than the blocks before it", folder.FieldPath(block),
-                       "remove this file and the .json beside it");
-    joined.splats.basis = splats.basis;
-    joined.splats.background = splats.background;
+    Splats kept(0, splats.basis);
     AppendSplats(
         splats, [&](int64_t i) { return OwnerOf(plan.blocks, splats.mean + 3 * i) == block; },
-        &joined.splats);
+        &kept);
+    // Blocks of few steps may have fewer harmonics.
+    const int basis = std::max(kept.basis, joined.splats.basis);
+    PadBasis(basis, &kept);
+    PadBasis(basis, &joined.splats);
+    AppendSplats(
+        kept.view(), [](int64_t) { return true; }, &joined.splats);
+    joined.splats.background = splats.background;
     joined.fit_pixels.push_back(stored.field.geometry->splats.fit_pixel);
     joined.devices.insert(record.device);
     joined.sums.seconds += record.seconds;
     joined.sums.peak_memory_gb = std::max(joined.sums.peak_memory_gb, record.peak_memory_gb);
     joined.sums.pixels += record.pixels;
     joined.sums.rejected += record.rejected;
-    if (record.psnr_train_db.value)
-      squared +=
-          static_cast<double>(record.pixels) * std::pow(10, -*record.psnr_train_db.value / 10);
+    if (!record.psnr_train_db.value) continue;
+    const double weight = static_cast<double>(record.pixels);
+    squared += weight * std::pow(10, -*record.psnr_train_db.value / 10);
+    weights += weight;
   }
-  joined.sums.psnr_train_db =
-      -10 * std::log10(squared / static_cast<double>(joined.sums.pixels));
+  joined.sums.psnr_train_db = -10 * std::log10(squared / weights);
   return joined;
 }
 
@@ -144,6 +148,15 @@ std::pair<Metric, Metric> MeasureSeams(const WorkingViews& views, const StoredFi
   return {psnr(1), psnr(0)};
 }
 
+// They were made of the field before.
+void ForgetStyles(const std::string& folder) {
+  for (const std::string& name : StyleNames(folder)) {
+    Workspace style(StyleFolder(folder, name));
+    for (const char* stage : kStageNames)
+      if (!IsOfScene(stage)) style.Forget(stage);
+  }
+}
+
 }  // namespace
 
 void JoinBlocks(RunContext* context, const BlockFolder& folder) {
@@ -151,7 +164,7 @@ void JoinBlocks(RunContext* context, const BlockFolder& folder) {
   Workspace& workspace = *context->workspace;
   Console* const console = context->console;
   if (const std::vector<int> missing = folder.Missing(); !missing.empty())
-    throw InputError(BlocksText(missing, folder.blocks()) + " were not made", folder.path(),
+    throw InputError(BlocksText(missing, folder.blocks()) + " missing", folder.path(),
                      "run `regrade refine DIR --part K/N` for each K; what is there is not "
                      "done again");
   const StageRecord before = *workspace.Find("reconstruct");
@@ -174,6 +187,7 @@ void JoinBlocks(RunContext* context, const BlockFolder& folder) {
              "no photo was held out");
   metrics.device = Join({joined.devices.begin(), joined.devices.end()}, ", ");
   metrics.splats = joined.splats.count();
+  metrics.sh_degree = static_cast<int>(std::lround(std::sqrt(joined.splats.basis))) - 1;
   metrics.rays = joined.sums.pixels;
   metrics.rejected_voxels = joined.sums.rejected;
   metrics.psnr_train_db = joined.sums.psnr_train_db;
@@ -197,8 +211,11 @@ void JoinBlocks(RunContext* context, const BlockFolder& folder) {
   std::vector<std::string> outputs;
   for (const StageOutput& output : before.outputs) outputs.push_back(output.path);
   const std::optional<double> cpu = before.cpu_seconds;
+  ForgetStyles(workspace.folder());
   workspace.Record("reconstruct", before.inputs, outputs, before.seconds, record.metrics, cpu);
   folder.Drop();
+  for (int block = 0; block < folder.blocks(); ++block)
+    workspace.DropCheckpoint(BlockStage(block));
   console->EndStage();
   const auto text = [](const Metric& metric) {
     return metric.value ? Format("%.2f", *metric.value) : std::string("-");

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "kernels/render/field_renderer.h"
 
@@ -10,13 +11,15 @@ namespace {
 
 constexpr int kSide = 160;                  // pixels of the longer side of the depth maps
 constexpr int64_t kMostPlaces = 4'000'000;  // of all photos
-// A photo that shows less of a block is not read for it: as a share of the photo.
-constexpr double kLeastShown = 0.01;
+// For a block those photos are read that have so much of the pixels that show it, at least
+// three.
+constexpr double kShown = 0.98;
+constexpr size_t kLeastViews = 3;
 
 struct SeenPlaces {
   std::vector<Vec3f> places;   // of all views, one after another
   std::vector<int64_t> until;  // [views]: how many are of it and of those before
-  std::vector<int64_t> pixels;
+  std::vector<int64_t> step;   // [views]: pixels for each of its places
 };
 
 // The places at the middle of every n-th pixel, so that all views give at most kMostPlaces.
@@ -39,7 +42,7 @@ SeenPlaces PlacesOf(const WorkingViews& views, const std::vector<int>& of,
       seen.places.push_back((world_from_camera * (ray * double{z})).Cast<float>());
     }
     seen.until.push_back(std::ssize(seen.places));
-    seen.pixels.push_back((pixels + step - 1) / step);
+    seen.step.push_back(step);
   }
   return seen;
 }
@@ -79,15 +82,26 @@ BlockPlan PlanBlocks(const WorkingViews& views, const StoredField& coarse, int b
   BlockPlan plan;
   plan.blocks = DivideSpace(seen.places, coarse.field.geometry->frame, blocks);
   for (const SpaceBlock& block : plan.blocks) {
-    std::vector<int>& of_block = plan.views.emplace_back();
-    int64_t at = 0;
+    std::vector<std::pair<int64_t, int>> shown;  // minus the pixels, and the view
+    int64_t at = 0, all = 0;
     for (size_t v = 0; v < training.size(); ++v) {
-      int64_t shown = 0;
+      int64_t pixels = 0;
       for (; at < seen.until[v]; ++at)
-        shown += block.held.Contains(&seen.places[static_cast<size_t>(at)].x);
-      if (static_cast<double>(shown) >= kLeastShown * static_cast<double>(seen.pixels[v]))
-        of_block.push_back(training[v]);
+        pixels += block.held.Contains(&seen.places[static_cast<size_t>(at)].x);
+      shown.emplace_back(-pixels * seen.step[v], training[v]);
+      all += pixels * seen.step[v];
     }
+    std::ranges::sort(shown);
+    std::vector<int>& of_block = plan.views.emplace_back();
+    int64_t covered = 0;
+    for (const auto& [pixels, view] : shown) {
+      if (of_block.size() >= kLeastViews &&
+          static_cast<double>(covered) >= kShown * static_cast<double>(all))
+        break;
+      of_block.push_back(view);
+      covered -= pixels;
+    }
+    std::ranges::sort(of_block);
   }
   return plan;
 }

@@ -31,10 +31,11 @@ class Division {
       return;
     }
     const int left = blocks / 2, axis = WidestAxis(places);
-    const float face = Quantile(places, axis, static_cast<double>(left) / blocks);
-    const auto middle = std::partition(places.begin(), places.end(),
-                                       [&](const Vec3f& p) { return p[axis] < face; });
-    const size_t count = static_cast<size_t>(middle - places.begin());
+    const size_t count =
+        places.size() * static_cast<size_t>(left) / static_cast<size_t>(blocks);
+    std::ranges::nth_element(places, places.begin() + static_cast<std::ptrdiff_t>(count), {},
+                             [axis](const Vec3f& p) { return p[axis]; });
+    const float face = places[count][axis];
     SplatHold low = owned, high = owned;
     low.high[axis] = high.low[axis] = face;
     Divide(places.first(count), low, left);

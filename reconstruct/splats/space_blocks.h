@@ -12,6 +12,7 @@
 // neighbours of earlier ones as they became. Around its own places it fits a rim of theirs,
 // too: of a neighbour that comes later, what it makes there is given up; of one before it, it
 // is kept, for it fits both sides of the face at once, and what is behind the rim as it is.
+// Blocks that meet in an edge or a corner alone may be fitted at the same time.
 #pragma once
 
 #include <vector>

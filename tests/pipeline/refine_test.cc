@@ -86,16 +86,18 @@ TEST_F(Refine, AJoinNamesWhatIsMissing) {
   const std::string coarse = ReadText(folder_ / "o/field.npz");
   const ProgramOutcome joined = RefineWith({"--join"});
   EXPECT_EQ(joined.code, static_cast<int>(ExitCode::kInput));
-  EXPECT_NE(joined.text.find("of 3 were not made"), std::string::npos) << joined.text;
+  EXPECT_NE(joined.text.find("of 3 missing"), std::string::npos) << joined.text;
   EXPECT_EQ(ReadText(folder_ / "o/field.npz"), coarse);
 }
 
 TEST_F(Refine, AJoinThatWasInterruptedIsRepeated) {
   for (int round = 0; round < 3; ++round) ASSERT_EQ(RefineWith({"--part", "1/1"}).code, 0);
   // The field is replaced, and that is not noted yet.
+  fs::remove(folder_ / "o/field.npz");
   for (const auto& entry : fs::directory_iterator(folder_ / "o/blocks"))
-    fs::copy_file(entry.path() / "00001.npz", folder_ / "o/field.npz",
-                  fs::copy_options::overwrite_existing);
+    fs::copy_file(entry.path() / "00001.npz", folder_ / "o/field.npz");
+  EXPECT_EQ(RefineWith({"--blocks", "2", "--part", "1/2"}).code,
+            static_cast<int>(ExitCode::kInput));
   const ProgramOutcome joined = RefineWith({"--join"});
   ASSERT_EQ(joined.code, 0) << joined.text;
   EXPECT_EQ(Refined().At("blocks").AsInt(), 3);
@@ -104,6 +106,7 @@ TEST_F(Refine, AJoinThatWasInterruptedIsRepeated) {
 TEST_F(Refine, WhatCannotBeIsRefused) {
   EXPECT_EQ(RefineWith({"--part", "4/3"}).code, static_cast<int>(ExitCode::kUsage));
   EXPECT_EQ(RefineWith({"--part", "1/3", "--join"}).code, static_cast<int>(ExitCode::kUsage));
+  EXPECT_EQ(RefineWith({"--holdout", "0"}).code, static_cast<int>(ExitCode::kUsage));
   EXPECT_EQ(RefineWith({}, "nowhere").code, static_cast<int>(ExitCode::kInput));
   EXPECT_FALSE(fs::exists(folder_ / "nowhere"));
   EXPECT_EQ(RefineWith({"--dry-run"}).code, 0);

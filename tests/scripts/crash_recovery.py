@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Kills runs at random times, restarts them until they finish, and compares the results with those of an unkilled run.
 
-  crash_recovery.py REGRADE [--kills 1000] [--part-kills 30] [--pose-kills 50] [--seed 0] [--effects mixed-cameras]
+  crash_recovery.py REGRADE [--kills 1000] [--part-kills 30] [--block-kills 10] [--pose-kills 50] [--seed 0] [--effects mixed-cameras]
 
 After the poses: a small synthetic capture is run once without kills in reproducible mode (the baseline). Then copies of
 its poses are run and killed with SIGKILL, SIGTERM or SIGINT at a random time after a stage has begun, stage by stage,
@@ -14,7 +14,8 @@ until it finishes. Its model must have every photo and lie within 0.5 degrees an
 --pose-kills needs colmap. A kill takes about 3 s on two cores.
 
 `regrade render` by parts, three at a time, is killed and begun again in the same way until each has finished; what
---join makes of them must be the baseline's, too.
+--join makes of them must be the baseline's, too. So are the blocks of `regrade refine`, two at a time, whose field must have
+the bytes of one that was refined without a kill.
 
   --control all   checks that this script finds errors: between two starts a checkpoint is exchanged for that of a run
                   with another seed, a frame is truncated, the record of a finished stage is removed. Each must be found.
@@ -189,29 +190,55 @@ class Supervisor:
         """Renders a finished folder again by parts, side by side, each killed at random times until it has ended."""
         self.reset(self.posed)
         self.complete(self.command(more=("--until", "stylize")), ["pose"])
-        part = [[self.regrade, "render", self.work, "--threads", "1", "--part", f"{k + 1}/{parts}"] for k in range(parts)]
-        left = list(range(parts))
-        while left:
-            runs = {k: subprocess.Popen(part[k], stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
-                    for k in left}
-            for k, run in runs.items():
-                if self.random.random() < 0.7:
-                    time.sleep(self.random.uniform(0, 0.6 * self.duration["render"]))
-                    run.kill()
-                status = run.wait()
-                if status == -signal.SIGKILL:
-                    self.kills["a part", "SIGKILL"] += 1
-                elif status != 0:
-                    sys.exit(f"exit status {status} of part {k + 1}")
-                else:
-                    left.remove(k)
-            for name in incomplete_files(self.work):
-                if ".regrade-tmp" not in name:
-                    self.report(f"{name} is incomplete after SIGKILL in a part")
+        self.kill_parts([self.regrade, "render", self.work], parts, 0.6 * self.duration["render"], "a part")
         status, error = call([self.regrade, "render", self.work, "--join"])
         if status != 0:
             self.report(f"the parts were not joined: {error}")
         self.compare("a film of killed parts")
+
+    def kill_parts(self, command, parts, seconds, what):
+        """The parts of a command side by side, each killed at random times until it has ended."""
+        left = list(range(parts))
+        while left:
+            runs = {k: subprocess.Popen([*command, "--threads", "1", "--part", f"{k + 1}/{parts}"], stdin=subprocess.DEVNULL,
+                                        stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) for k in left}
+            for k, run in runs.items():
+                if self.random.random() < 0.7:
+                    time.sleep(self.random.uniform(0, seconds))
+                    run.kill()
+                status = run.wait()
+                if status == -signal.SIGKILL:
+                    self.kills[what, "SIGKILL"] += 1
+                elif status != 0:
+                    sys.exit(f"exit status {status} of part {k + 1} of {command[1]}")
+                else:
+                    left.remove(k)
+            for name in incomplete_files(self.work):
+                if ".regrade-tmp" not in name:
+                    self.report(f"{name} is incomplete after SIGKILL in {what}")
+
+    def blocks_with_kills(self):
+        """Refines a finished field in blocks, two at a time, each killed at random times until all are made."""
+        refine = ["--blocks", "3", "--splats", "4", "--splat-steps", "1200"]
+        self.reset(self.posed)
+        self.complete(self.command(more=("--until", "stylize")), ["pose"])
+        alone = os.path.join(self.scratch, "refined")
+        if not os.path.exists(alone):
+            shutil.copytree(self.work, alone)
+            begin = time.monotonic()
+            status, error = call([self.regrade, "refine", alone, *refine])
+            if status != 0:
+                sys.exit(f"regrade refine: {error}")
+            self.duration["refine"] = time.monotonic() - begin
+        for _ in range(3):
+            self.kill_parts([self.regrade, "refine", self.work, *refine], 2, 0.5 * self.duration["refine"], "a block")
+        status, error = call([self.regrade, "refine", self.work, *refine, "--join"])
+        if status != 0:
+            self.report(f"the blocks were not joined: {error}")
+        self.compared += 1
+        with open(os.path.join(self.work, "field.npz"), "rb") as one, open(os.path.join(alone, "field.npz"), "rb") as other:
+            if one.read() != other.read():
+                self.report("the field of killed blocks is another one")
 
     def pose_with_kills(self, seconds, most, compare_poses):
         """`regrade pose` from photos, with a few kills at any time, until it is finished."""
@@ -333,7 +360,7 @@ class Supervisor:
 
     def table(self):
         print(f"{'killed in':20}" + "".join(f"{number.name:>9}" for number in SIGNALS))
-        for where in ("the start", *STAGES, "between two stages", "a part"):
+        for where in ("the start", *STAGES, "between two stages", "a part", "a block"):
             counts = [self.kills[where, number.name] for number in SIGNALS]
             if any(counts):
                 print(f"{where:20}" + "".join(f"{count:9}" for count in counts))
@@ -344,6 +371,7 @@ def main():
     parser.add_argument("regrade")
     parser.add_argument("--kills", type=int, default=1000, metavar="N", help="kills after the poses (1000)")
     parser.add_argument("--part-kills", type=int, default=30, metavar="N", help="kills within parts of frames and films (30)")
+    parser.add_argument("--block-kills", type=int, default=10, metavar="N", help="kills within blocks of a field (10)")
     parser.add_argument("--pose-kills", type=int, default=50, metavar="N", help="kills within COLMAP's stage (50)")
     parser.add_argument("--seed", type=int, default=0, help="seed of stages, times, signals and threads")
     parser.add_argument("--effects", default="", help="effects of the synthetic capture, e.g. mixed-cameras")
@@ -353,7 +381,7 @@ def main():
     options = parser.parse_args()
     with tempfile.TemporaryDirectory() as scratch:
         supervisor = Supervisor(os.path.abspath(options.regrade), scratch, options.seed, options.effects)
-        if options.control != "none" or options.kills or options.part_kills:
+        if options.control != "none" or options.kills or options.part_kills or options.block_kills:
             supervisor.run_baseline()
         if options.control != "none":
             supervisor.control(options.control == "short")
@@ -367,6 +395,9 @@ def main():
         begin = supervisor.total()
         while supervisor.total() - begin < options.part_kills:
             supervisor.parts_with_kills()
+        begin = supervisor.total()
+        while supervisor.total() - begin < options.block_kills:
+            supervisor.blocks_with_kills()
         if options.pose_kills:
             supervisor.pose_kills(options.pose_kills, options.compare_poses)
         supervisor.table()
