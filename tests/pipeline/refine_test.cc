@@ -96,7 +96,7 @@ TEST_F(Refine, AJoinThatWasInterruptedIsRepeated) {
   fs::remove(folder_ / "o/field.npz");
   for (const auto& entry : fs::directory_iterator(folder_ / "o/blocks"))
     fs::copy_file(entry.path() / "00001.npz", folder_ / "o/field.npz");
-  EXPECT_EQ(RefineWith({"--blocks", "2", "--part", "1/2"}).code,
+  EXPECT_EQ(Regrade({"refine", folder_ / "o", "--blocks", "2", "--part", "1/2"}).code,
             static_cast<int>(ExitCode::kInput));
   const ProgramOutcome joined = RefineWith({"--join"});
   ASSERT_EQ(joined.code, 0) << joined.text;
