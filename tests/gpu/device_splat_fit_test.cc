@@ -1,6 +1,7 @@
 // Fits of splats on the device against those on the CPU; skipped without a device.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <vector>
 
@@ -163,6 +164,29 @@ TEST_F(DeviceSplatFit, ReproducesAHeldOutViewWithTheSameBitsEachTime) {
   for (size_t i = 0; i < background.pixels.size(); ++i)
     background.pixels[i] = truth_.background[static_cast<int>(i % 3)];
   EXPECT_GT(psnr[0], testing::Psnr(background, photos_[0]) + 12);
+}
+
+TEST_F(DeviceSplatFit, FrozenSplatsKeepTheirBits) {
+  fit_.steps = 100;
+  const Splats start = FitSplats(views_, box_, fit_, {}, Backend::kCuda).splats;
+  const int64_t frozen = start.count() / 2;
+  SplatFitState state = RefinementOf(start, frozen);
+  SplatFitHooks hooks;
+  hooks.resume = &state;
+  const Splats refined =
+      RefineSplats(SplatPhotos(views_), {}, box_, fit_, hooks, Backend::kCuda).splats;
+  const auto same = [frozen](const std::vector<float>& a, const std::vector<float>& b,
+                             int64_t each) {
+    return std::equal(a.begin(), a.begin() + each * frozen, b.begin());
+  };
+  ASSERT_EQ(refined.basis, start.basis);
+  EXPECT_GT(refined.count(), start.count());
+  EXPECT_TRUE(same(start.mean, refined.mean, 3));
+  EXPECT_TRUE(same(start.log_scale, refined.log_scale, 3));
+  EXPECT_TRUE(same(start.quaternion, refined.quaternion, 4));
+  EXPECT_TRUE(same(start.opacity_logit, refined.opacity_logit, 1));
+  EXPECT_TRUE(same(start.sh, refined.sh, 3 * start.basis));
+  EXPECT_NE(start.mean.back(), refined.mean[start.mean.size() - 1]);
 }
 
 }  // namespace
