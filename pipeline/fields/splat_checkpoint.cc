@@ -10,7 +10,7 @@ template <typename State, typename Visit>
 void VisitValues(State* state, const Visit& visit) {
   visit(&state->splats.basis);
   for (int a = 0; a < 3; ++a) visit(&state->splats.background[a]);
-  visit(&state->step), visit(&state->frozen);
+  visit(&state->step), visit(&state->frozen), visit(&state->spare_unseen);
   auto& tally = state->tally;
   visit(&tally.window_error), visit(&tally.tail_error);
   visit(&tally.window_values), visit(&tally.tail_values);

@@ -35,7 +35,8 @@ struct SplatFitTally {
 // Everything needed to resume a fit with the same result as without a stop.
 struct SplatFitState {
   Splats splats, first_moment, second_moment;
-  int64_t frozen = 0;  // the first ones, which the fit does not change
+  int64_t frozen = 0;         // the first ones, which the fit does not change
+  bool spare_unseen = false;  // see SplatUpdate; decided at step 0
   int step = 0;
   SplatFitTally tally;
 };

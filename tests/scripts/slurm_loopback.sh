@@ -61,7 +61,7 @@ cp "$root"/assets/style_{night,autumn}.png "$work/styles"
 cd "$root/scripts/cluster"
 film="--film-seconds 8 --film-size 320"
 snakemake --profile "$root/scripts/slurm" --config regrade="$regrade" photos="$(realpath "$photos")" styles="$work/styles" out="$work/out" \
-  parts=3 threads=1 memory_mb=2000 scene="--preset draft --photo-size 200 --splat-steps 300" blocks=2 \
+  parts=3 threads=1 memory_mb=2000 scene="--preset draft --photo-size 200 --splat-steps 1000" blocks=2 \
   refine="--splats 40 --splat-steps 600 --photo-size 200" style="--style-steps 40" film="$film" \
   >"$work/log" 2>&1 &
 workflow=$!
