@@ -106,6 +106,11 @@ void AppendSplats(const SplatsView<float>& from, const Take& take, Splats* to) {
   }
 }
 
+inline void AppendSplats(const SplatsView<float>& from, Splats* to) {
+  AppendSplats(
+      from, [](int64_t) { return true; }, to);
+}
+
 // Whether splat i may be in a picture.
 template <typename T>
 HD bool IsUsable(const SplatsView<T>& splats, int64_t i) {

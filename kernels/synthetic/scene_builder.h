@@ -11,6 +11,9 @@
 
 namespace regrade {
 
+// sRGB colours as 0xRRGGBB; the first is the ground.
+using Palette = std::array<uint32_t, 5>;
+
 // Places solids and gives each paint another random stream.
 class SceneBuilder {
  public:
@@ -20,7 +23,7 @@ class SceneBuilder {
     scene_.name = name;
   }
 
-  Paint MakePaint(Pattern pattern, double size, std::array<uint32_t, 5> hex) {
+  Paint MakePaint(Pattern pattern, double size, Palette hex) {
     Paint paint;
     paint.pattern = pattern;
     paint.size = size;

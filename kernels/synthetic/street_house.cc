@@ -6,8 +6,6 @@
 namespace regrade {
 namespace {
 
-using Palette = std::array<uint32_t, 5>;
-
 constexpr Palette kHouseWalls[] = {{0xd8b48a, 0xb98258, 0xe6cfa6, 0x9a6a4c, 0xc7a070},
                                    {0xb5604a, 0x8f4436, 0xcf8166, 0xdab79a, 0x74392f},
                                    {0xe2d9c4, 0xb9ad92, 0xf0ead8, 0xa8916d, 0xc9b28a},

@@ -19,33 +19,30 @@ constexpr double kPavement = 0.14;          // its height
 constexpr double kDome = 600;
 constexpr double kCrossings[] = {-104, -31, 46, 118};  // of pedestrians
 
-constexpr std::array<uint32_t, 5> kAsphalt = {0x77767a, 0x8c8a88, 0x605f64, 0x9b948a, 0x6c7076};
-constexpr std::array<uint32_t, 5> kSlabs = {0xb3aca0, 0x9a9488, 0xc6c0b4, 0x8a8078, 0xa8a49e};
-constexpr std::array<uint32_t, 5> kMarking = {0xdedbd0, 0xc4c0b4, 0xe8e6de, 0xb0aca2, 0xcfccc0};
-constexpr std::array<uint32_t, 5> kGrass = {0x86955e, 0x6d7f4b, 0xa0a873, 0x94885c, 0x5d7046};
-constexpr std::array<uint32_t, 5> kHills = {0x7d9568, 0x62805c, 0x9cab78, 0xb0a678, 0x527058};
-constexpr std::array<uint32_t, 5> kClouds = {0xb8cfe6, 0xc6d8ea, 0xe0e8f0, 0xf4f6f8, 0x9cc0e2};
-constexpr std::array<uint32_t, 5> kBark = {0x6e5a48, 0x55463a, 0x86705a, 0x453a32, 0x7a6a58};
-constexpr std::array<uint32_t, 5> kFoliage[] = {
-    {0x5d8a45, 0x86ad5c, 0x3f6b3a, 0xa9c26a, 0x4c7a4a},
-    {0x7a9a48, 0xa8bb5e, 0x567a3a, 0xcfc86a, 0x668a50},
-    {0x4d7a52, 0x72a06c, 0x345c44, 0x98b878, 0x5a8a68}};
-constexpr std::array<uint32_t, 5> kIron = {0x47505a, 0x5c6670, 0x363d46, 0x748088, 0x505a60};
-constexpr std::array<uint32_t, 5> kTimber = {0xa8804f, 0x8a6540, 0xc09a68, 0x745436, 0x98744c};
-constexpr std::array<uint32_t, 5> kGlass = {0x35424c, 0x536874, 0x222c34, 0x7f97a2, 0x42525c};
-constexpr std::array<uint32_t, 5> kRubber = {0x2e2e30, 0x8f9294, 0x3c3c40, 0x68686c, 0x262628};
-constexpr std::array<uint32_t, 5> kCars[] = {
-    {0xb23a36, 0xc85a50, 0x8e2a2a, 0xd88a70, 0xa04040},
-    {0x3a62a0, 0x5680ba, 0x2a4a80, 0x86a8d0, 0x4a6a98},
-    {0xd8d6ce, 0xbcbab2, 0xe8e6e0, 0xa2a09a, 0xcac4b8},
-    {0x4a7a60, 0x6a9a7c, 0x365e4a, 0x94b89a, 0x587a68},
-    {0xc89a38, 0xdcb860, 0xa47a28, 0xe8d090, 0xb48a40},
-    {0x6a6e76, 0x888c94, 0x50545c, 0xa4a8ae, 0x5e626a}};
-constexpr std::array<uint32_t, 5> kGoods[] = {
-    {0xc2544d, 0xe3d7bd, 0x8a3a38, 0xd98e5a, 0x53627c},
-    {0x2f8f86, 0xd8e2c8, 0x1f5c66, 0x8cc7a8, 0xe0b04c},
-    {0xdba83a, 0xa8562f, 0xf0e0b4, 0x8c7a2e, 0x4e7a6b},
-    {0x7d5590, 0xc98fb6, 0x53386e, 0xe3c9a0, 0x4f7fa0}};
+constexpr Palette kAsphalt = {0x77767a, 0x8c8a88, 0x605f64, 0x9b948a, 0x6c7076};
+constexpr Palette kSlabs = {0xb3aca0, 0x9a9488, 0xc6c0b4, 0x8a8078, 0xa8a49e};
+constexpr Palette kMarking = {0xdedbd0, 0xc4c0b4, 0xe8e6de, 0xb0aca2, 0xcfccc0};
+constexpr Palette kGrass = {0x86955e, 0x6d7f4b, 0xa0a873, 0x94885c, 0x5d7046};
+constexpr Palette kHills = {0x7d9568, 0x62805c, 0x9cab78, 0xb0a678, 0x527058};
+constexpr Palette kClouds = {0xb8cfe6, 0xc6d8ea, 0xe0e8f0, 0xf4f6f8, 0x9cc0e2};
+constexpr Palette kBark = {0x6e5a48, 0x55463a, 0x86705a, 0x453a32, 0x7a6a58};
+constexpr Palette kFoliage[] = {{0x5d8a45, 0x86ad5c, 0x3f6b3a, 0xa9c26a, 0x4c7a4a},
+                                {0x7a9a48, 0xa8bb5e, 0x567a3a, 0xcfc86a, 0x668a50},
+                                {0x4d7a52, 0x72a06c, 0x345c44, 0x98b878, 0x5a8a68}};
+constexpr Palette kIron = {0x47505a, 0x5c6670, 0x363d46, 0x748088, 0x505a60};
+constexpr Palette kTimber = {0xa8804f, 0x8a6540, 0xc09a68, 0x745436, 0x98744c};
+constexpr Palette kGlass = {0x35424c, 0x536874, 0x222c34, 0x7f97a2, 0x42525c};
+constexpr Palette kRubber = {0x2e2e30, 0x8f9294, 0x3c3c40, 0x68686c, 0x262628};
+constexpr Palette kCars[] = {{0xb23a36, 0xc85a50, 0x8e2a2a, 0xd88a70, 0xa04040},
+                             {0x3a62a0, 0x5680ba, 0x2a4a80, 0x86a8d0, 0x4a6a98},
+                             {0xd8d6ce, 0xbcbab2, 0xe8e6e0, 0xa2a09a, 0xcac4b8},
+                             {0x4a7a60, 0x6a9a7c, 0x365e4a, 0x94b89a, 0x587a68},
+                             {0xc89a38, 0xdcb860, 0xa47a28, 0xe8d090, 0xb48a40},
+                             {0x6a6e76, 0x888c94, 0x50545c, 0xa4a8ae, 0x5e626a}};
+constexpr Palette kGoods[] = {{0xc2544d, 0xe3d7bd, 0x8a3a38, 0xd98e5a, 0x53627c},
+                              {0x2f8f86, 0xd8e2c8, 0x1f5c66, 0x8cc7a8, 0xe0b04c},
+                              {0xdba83a, 0xa8562f, 0xf0e0b4, 0x8c7a2e, 0x4e7a6b},
+                              {0x7d5590, 0xc98fb6, 0x53386e, 0xe3c9a0, 0x4f7fa0}};
 
 // Brings the colours closer to the ground's.
 Paint Softened(Paint paint) {
@@ -148,7 +145,7 @@ void AddTree(double x, double y, Dice& dice, SceneBuilder& b) {
         b.MakePaint(Pattern::kTerrazzo, 0.25, kBark));
   b.AddBlock(x, y, kPavement - 0.1, {1.1, 1.1, 0.13}, 0,
              b.MakePaint(Pattern::kTiles, 0.25, kIron));
-  const std::array<uint32_t, 5>& leaves = kFoliage[dice.Below(3)];
+  const Palette& leaves = kFoliage[dice.Below(3)];
   const double turn = dice.In(0, 2 * M_PI);
   for (int i = 0; i < 6; ++i) {
     const double angle = turn + 2 * M_PI * i / 5, away = i < 5 ? dice.In(0.65, 0.95) : 0;
@@ -161,7 +158,7 @@ void AddTree(double x, double y, Dice& dice, SceneBuilder& b) {
 }
 
 void AddCar(double x, double y, Dice& dice, SceneBuilder& b) {
-  const std::array<uint32_t, 5>& colors = kCars[dice.Below(6)];
+  const Palette& colors = kCars[dice.Below(6)];
   const double length = dice.In(3.7, 4.5), front = dice.Chance(0.5) ? 1 : -1;
   const double cabin = x - front * 0.06 * length;
   const auto paint = [&] { return Softened(b.MakePaint(Pattern::kPainting, 0.4, colors)); };

@@ -11,17 +11,17 @@ namespace regrade {
 namespace {
 
 // Palettes: the ground first. Every scene has warm, cold and green hues.
-constexpr std::array<uint32_t, 5> kStone = {0xd9d2c3, 0xb5644b, 0x4f7f8c, 0x8a8f5a, 0xc9a24f};
-constexpr std::array<uint32_t, 5> kAzulejo = {0xdfe6e2, 0x3f6fa8, 0x5fa39b, 0xd9a441, 0x86b6cf};
-constexpr std::array<uint32_t, 5> kLinen = {0xe3d7bd, 0xc2544d, 0xd98e5a, 0x7d9b76, 0x53627c};
-constexpr std::array<uint32_t, 5> kCoral = {0xdd6b4d, 0xf1d9b0, 0xa83a38, 0xf0a868, 0x7c4a58};
-constexpr std::array<uint32_t, 5> kTeal = {0x2f8f86, 0xd8e2c8, 0x1f5c66, 0x8cc7a8, 0xe0b04c};
-constexpr std::array<uint32_t, 5> kMustard = {0xdba83a, 0xa8562f, 0xf0e0b4, 0x8c7a2e, 0x4e7a6b};
-constexpr std::array<uint32_t, 5> kPlum = {0x7d5590, 0xc98fb6, 0x53386e, 0xe3c9a0, 0x4f7fa0};
-constexpr std::array<uint32_t, 5> kLeaf = {0x6f9e52, 0xcad99a, 0x3f6e4a, 0xd9c25a, 0x8fb8a0};
-constexpr std::array<uint32_t, 5> kSky = {0x5f93c4, 0xcfe0e8, 0x35618f, 0xe0a878, 0x8fc0c8};
-constexpr std::array<uint32_t, 5> kOak = {0xb98a5e, 0xa5744a, 0xc79c6e, 0x946642, 0xb07d58};
-constexpr std::array<uint32_t, 5> kPlaster = {0xd8c6a8, 0xc9a98a, 0xe6dcc6, 0xb9b49a, 0xa9bdb8};
+constexpr Palette kStone = {0xd9d2c3, 0xb5644b, 0x4f7f8c, 0x8a8f5a, 0xc9a24f};
+constexpr Palette kAzulejo = {0xdfe6e2, 0x3f6fa8, 0x5fa39b, 0xd9a441, 0x86b6cf};
+constexpr Palette kLinen = {0xe3d7bd, 0xc2544d, 0xd98e5a, 0x7d9b76, 0x53627c};
+constexpr Palette kCoral = {0xdd6b4d, 0xf1d9b0, 0xa83a38, 0xf0a868, 0x7c4a58};
+constexpr Palette kTeal = {0x2f8f86, 0xd8e2c8, 0x1f5c66, 0x8cc7a8, 0xe0b04c};
+constexpr Palette kMustard = {0xdba83a, 0xa8562f, 0xf0e0b4, 0x8c7a2e, 0x4e7a6b};
+constexpr Palette kPlum = {0x7d5590, 0xc98fb6, 0x53386e, 0xe3c9a0, 0x4f7fa0};
+constexpr Palette kLeaf = {0x6f9e52, 0xcad99a, 0x3f6e4a, 0xd9c25a, 0x8fb8a0};
+constexpr Palette kSky = {0x5f93c4, 0xcfe0e8, 0x35618f, 0xe0a878, 0x8fc0c8};
+constexpr Palette kOak = {0xb98a5e, 0xa5744a, 0xc79c6e, 0x946642, 0xb07d58};
+constexpr Palette kPlaster = {0xd8c6a8, 0xc9a98a, 0xe6dcc6, 0xb9b49a, 0xa9bdb8};
 
 SyntheticScene MakeTable(uint64_t seed) {
   SceneBuilder b("table", seed);
@@ -100,7 +100,7 @@ SyntheticScene MakeSquare(uint64_t seed) {
   // Far: paving, houses at 12 to 20, a dome of hills and clouds at 100.
   b.Add(Shape::kCylinder, {0, 0, -0.6}, {30, 0, 0.1}, b.MakePaint(Pattern::kTiles, 2.6, kStone))
       .casts_shadow = false;
-  const std::array<uint32_t, 5> walls[] = {kCoral, kLinen, kTeal, kMustard, kPlum, kAzulejo};
+  const Palette walls[] = {kCoral, kLinen, kTeal, kMustard, kPlum, kAzulejo};
   const Pattern patterns[] = {Pattern::kPainting, Pattern::kTiles, Pattern::kTerrazzo};
   for (int i = 0; i < 9; ++i) {
     const double angle = 2 * M_PI * (i + 0.3 * (i % 2)) / 9, away = 12 + 8.0 * (i * 4 % 9) / 8;

@@ -1,7 +1,7 @@
 // Analytic scenes with known ground truth, and the cameras that photograph them.
 //
-// World: z is up, lengths are about metres. Everything visible from a
-// default camera lies inside the scene's bounds.
+// World: z is up, lengths are about metres. Everything visible from a default camera lies
+// inside the scene's bounds.
 #pragma once
 
 #include <cstdint>

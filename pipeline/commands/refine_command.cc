@@ -87,9 +87,9 @@ void MakeBlocks(RunContext* context, const BlockFolder& folder) {
                              : BlocksText(made, folder.blocks()) + ": done in " +
                                    DurationText(console->StageSeconds()));
   if (!left.empty())
-    console->Info(BlocksText(left, folder.blocks()) +
-                  " come after neighbours that other parts make: give the command again "
-                  "once they have ended");
+    console->Info(BlocksText(left, folder.blocks(), " waits", " wait") +
+                  " for neighbours that other parts make: give the command again once they "
+                  "have ended");
 }
 
 void Refine(RunContext* context) {

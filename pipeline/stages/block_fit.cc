@@ -73,27 +73,23 @@ StoredField FieldAround(const StoredField& coarse, const BlockFolder& folder,
                            [&](int b) { return plan.blocks[static_cast<size_t>(b)].turn; });
   Splats all(0, coarse.field.appearance.basis);
   all.background = coarse.field.background;
-  AppendSplats(
-      SplatsOf(coarse.field), [](int64_t) { return true; }, &all);
+  AppendSplats(SplatsOf(coarse.field), &all);
   for (const int b : before) {
     const StoredField neighbor = ReadFieldFile(folder.FieldPath(b));
-    Splats refined(0, neighbor.field.appearance.basis), kept(0, all.basis);
+    const SplatsView<float> there = all.view(), refined = SplatsOf(neighbor.field);
+    Splats next(0, all.basis), own(0, refined.basis);
+    next.background = all.background;
     AppendSplats(
-        SplatsOf(neighbor.field), [](int64_t) { return true; }, &refined);
-    AppendSplats(
-        all.view(),
+        there,
         [&](int64_t i) {
-          return !Keeps(plan.blocks, static_cast<size_t>(b),
-                        &all.mean[static_cast<size_t>(3 * i)]);
+          return !Keeps(plan.blocks, static_cast<size_t>(b), there.mean + 3 * i);
         },
-        &kept);
-    kept.background = all.background;
-    const int basis = std::max(all.basis, refined.basis);
-    PadBasis(basis, &kept);
-    PadBasis(basis, &refined);
-    AppendSplats(
-        refined.view(), [](int64_t) { return true; }, &kept);
-    all = std::move(kept);
+        &next);
+    AppendSplats(refined, &own);
+    PadBasis(std::max(next.basis, own.basis), &next);
+    PadBasis(next.basis, &own);
+    AppendSplats(own.view(), &next);
+    all = std::move(next);
   }
   return {FieldOfSplats(all, coarse.field.geometry->frame, coarse.field.near_clip, -1),
           coarse.field_from_world, coarse.ndc};
@@ -130,14 +126,15 @@ void FitBlock(const RunContext& context, const WorkingViews& views, const Stored
   options.steps = std::max(1, static_cast<int>(std::lround(options.steps * part_of_photos)));
   options.thousands *= static_cast<float>(space.share);
   options.seed = settings.run.seed + static_cast<uint64_t>(block);
+  // The process has the field twice besides: each is a sixth of what a fit has of a splat.
+  const int64_t copies = backend == Backend::kCpu ? splats.count / 3 : 0;
   const FitPlace place{.backend = backend,
                        .pixels = input.photos.num_pixels(),
                        .photos = input.photos.count(),
                        .box = BoxOf(around),
                        .max_memory_gb = settings.run.max_memory_gb,
                        .reproducible = settings.run.reproducible,
-                       // And the field, twice, which is a third of what a fit has of a splat.
-                       .frozen_splats = frozen + splats.count * 2 / 3,
+                       .frozen_splats = frozen + copies,
                        .is_block = true};
   const PlannedSplatFit fit = SplatsWithinMemory(options, place, start.count() - frozen);
   console->Info(Concat("block ", block + 1, ": ", Counted(input.photos.count(), "photo"), ", ",

@@ -1,6 +1,8 @@
 #include "pipeline/stages/block_folder.h"
 
+#include <algorithm>
 #include <filesystem>
+#include <utility>
 
 #include "kernels/base/error.h"
 #include "kernels/base/hash.h"
@@ -16,8 +18,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr char kField[] = "field.npz", kInputs[] = "inputs.json", kCoarse[] = "coarse.npz",
-               kPlan[] = "plan.json";
+constexpr char kField[] = "field.npz", kCoarse[] = "coarse.npz", kPlan[] = "plan.json";
 constexpr uint64_t kMostField = uint64_t{64} << 30;
 
 StageRecord RecordOf(const RunContext& context) {
@@ -36,13 +37,6 @@ std::string FieldHash(const RunContext& context) {
                    context.workspace->folder(), "run `regrade reconstruct` again");
 }
 
-// Several processes may write the same file at the same moment: the last one wins, whole.
-void WriteBesideOthers(const std::string& path, const JsonValue& value) {
-  const std::string made = OwnTemporary(path);
-  WriteJsonFile(made, value);
-  RenameDurably(made, path);
-}
-
 // A link where the file system has them.
 void CopyFile(const std::string& from, const std::string& to) {
   const std::string made = OwnTemporary(to);
@@ -56,29 +50,27 @@ void CopyFile(const std::string& from, const std::string& to) {
 }  // namespace
 
 BlockFolder::BlockFolder(const RunContext& context, int blocks)
-    : root_(context.workspace->Path(kBlocksFolder)),
-      field_(context.workspace->Path(kField)),
-      blocks_(blocks) {
+    : field_(context.workspace->Path(kField)), blocks_(blocks) {
   const RunSettings& settings = context.settings;
-  inputs_ = JsonValue::Object{
+  JsonValue inputs = JsonValue::Object{
       {"poses", context.ResultOf("pose")},        {"blocks", blocks},
       {"splats", OptionValues(settings.splats)},  {"photo-size", settings.scene.photo_size},
       {"holdout", settings.run.holdout},          {"seed", settings.run.seed},
       {"reproducible", settings.run.reproducible}};
-  if (settings.run.reproducible) inputs_["max-memory"] = settings.run.max_memory_gb;
+  if (settings.run.reproducible) inputs["max-memory"] = settings.run.max_memory_gb;
   const StageRecord record = RecordOf(context);
   const JsonValue* const holdout = record.inputs.Find("holdout");
   if (holdout != nullptr && !(*holdout == JsonValue(settings.run.holdout)))
     throw UsageError(Concat("the field was fitted with ", holdout->AsInt()), "--holdout",
                      "leave it out: photos that were held out stay so");
-  settings_ = HashText(HashOf(DumpJson(inputs_, -1)));
+  settings_ = HashText(HashOf(DumpJson(inputs, -1)));
   const ReconstructReport made = MetricsFromJson<ReconstructReport>(record.metrics);
   if (!made.splats)
     throw InputError("its field has voxels, and blocks are of splats",
                      context.workspace->folder(), "reconstruct it with --field splats");
   joined_ = made.refined && made.refined->settings == settings_;
-  inputs_["field"] = FieldHash(context);
-  path_ = root_ + "/" + HashText(HashOf(DumpJson(inputs_, -1)));
+  inputs["field"] = FieldHash(context);
+  work_.emplace(context.workspace->Path(kBlocksFolder), std::move(inputs));
 }
 
 std::string BlockFolder::FieldPath(int block) const {
@@ -99,15 +91,14 @@ std::vector<int> BlockFolder::Missing() const {
 }
 
 void BlockFolder::Begin() const {
-  MakeFolder(path_);
+  work_->Begin();
   if (!fs::exists(Path(kCoarse))) {
-    if (HashFile(field_) != inputs_.At("field").AsString())
+    if (HashFile(field_) != inputs().At("field").AsString())
       throw InputError("is not what stage reconstruct made", field_,
                        "run `regrade refine` without --part, which repairs what a kill left "
                        "half done, or `regrade reconstruct` again");
     CopyFile(field_, Path(kCoarse));
   }
-  if (!fs::exists(Path(kInputs))) WriteBesideOthers(Path(kInputs), inputs_);
 }
 
 std::optional<BlockPlan> BlockFolder::Plan() const {
@@ -134,15 +125,6 @@ void BlockFolder::Record(int block, const BlockRecord& record) const {
   WriteBesideOthers(Path(Format("%05d.json", block + 1)), MetricsToJson(record));
 }
 
-// Under another name first: what is half removed is no block.
-void BlockFolder::Drop() const {
-  const std::string gone = OwnTemporary(path_);
-  std::error_code error;
-  fs::rename(path_, gone, error);
-  fs::remove_all(gone, error);
-  fs::remove(root_, error);  // if it is empty
-}
-
 void RepairField(const RunContext& context) {
   const std::string field = context.workspace->Path(kField), hash = FieldHash(context);
   if (fs::exists(field) && HashFile(field) == hash) return;
@@ -158,15 +140,16 @@ void RepairField(const RunContext& context) {
                    "run `regrade reconstruct` again");
 }
 
-std::string BlocksText(std::vector<int> blocks, int all) {
+std::string BlocksText(const std::vector<int>& blocks, int all, const char* verb_of_one,
+                       const char* verb_of_more) {
   constexpr size_t kNamed = 8;
   std::vector<std::string> names;
-  for (const int block : blocks) names.push_back(std::to_string(block + 1));
-  if (names.size() > kNamed) {
-    names.resize(kNamed);
-    names.push_back("...");
-  }
-  return Concat(blocks.size() == 1 ? "block " : "blocks ", Join(names, ", "), " of ", all);
+  for (size_t i = 0; i < std::min(kNamed, blocks.size()); ++i)
+    names.push_back(std::to_string(blocks[i] + 1));
+  if (blocks.size() > kNamed) names.push_back("...");
+  const bool one = blocks.size() == 1;
+  return Concat(one ? "block " : "blocks ", Join(names, ", "), " of ", all,
+                one ? verb_of_one : verb_of_more);
 }
 
 }  // namespace regrade

@@ -1,7 +1,7 @@
 // The files of a field that is refined in blocks: DIR/blocks/HASH/, HASH being that of what the
 // blocks are made of.
 //
-//   inputs.json  that
+//   inputs.json  see SharedWork
 //   coarse.npz   the field that is refined
 //   plan.json    see PlanBlocks; of whoever came first, and the same for all
 //   00001.npz    splats of block 1 of 1, 2, ..., those that it keeps; a field file
@@ -14,6 +14,7 @@
 
 #include "pipeline/run/run_context.h"
 #include "pipeline/stages/block_plan.h"
+#include "pipeline/workspace/shared_work.h"
 
 namespace regrade {
 
@@ -46,14 +47,15 @@ class BlockFolder {
   // field of splats, or it was changed.
   BlockFolder(const RunContext& context, int blocks);
 
-  const JsonValue& inputs() const { return inputs_; }
+  const JsonValue& inputs() const { return work_->inputs(); }
   // Of all of them but the field.
   const std::string& settings() const { return settings_; }
   // Was the run's field made by these settings?
   bool IsJoined() const { return joined_; }
-  const std::string& path() const { return path_; }
+  const std::string& path() const { return work_->path(); }
   int blocks() const { return blocks_; }
-  std::string Path(const std::string& name) const { return path_ + "/" + name; }
+  std::string Path(const std::string& name) const { return work_->Path(name); }
+  std::string OtherSettings() const { return work_->OtherSettings(); }
   std::string FieldPath(int block) const;  // block: from 0 on
   // Of who makes it, so that nobody else does at the same time.
   std::string LockPath(int block) const { return FieldPath(block) + ".lock"; }
@@ -67,13 +69,13 @@ class BlockFolder {
   BlockPlan KeepPlan(const BlockPlan& plan) const;
   void Record(int block, const BlockRecord& record) const;
   // Removes it all, once the field is made.
-  void Drop() const;
+  void Drop() const { work_->Drop(); }
 
  private:
-  std::string root_, path_, field_, settings_;
+  std::string field_, settings_;
   int blocks_;
   bool joined_ = false;
-  JsonValue inputs_;
+  std::optional<SharedWork> work_;
 };
 
 // The name of its checkpoints.
@@ -83,7 +85,9 @@ inline std::string BlockStage(int block) { return Concat("block-", block + 1); }
 // the field before it back. Throws Error(kInput) where the field was changed otherwise.
 void RepairField(const RunContext& context);
 
-// "2, 5 and 7 of 8 blocks"; blocks count from 1 here.
-std::string BlocksText(std::vector<int> blocks, int all);
+// "blocks 2, 5, 7 of 8 are missing", of the verbs " is missing" and " are missing"; counted
+// from 1 here.
+std::string BlocksText(const std::vector<int>& blocks, int all, const char* verb_of_one = "",
+                       const char* verb_of_more = "");
 
 }  // namespace regrade

@@ -7,7 +7,6 @@
 #include <utility>
 
 #include "kernels/base/error.h"
-#include "kernels/image/detail_kept.h"
 #include "kernels/render/field_renderer.h"
 #include "kernels/splats/splat_field.h"
 #include "pipeline/program/device_choice.h"
@@ -42,8 +41,7 @@ Joined ReadBlocks(const BlockFolder& folder, const BlockPlan& plan) {
     const int basis = std::max(kept.basis, joined.splats.basis);
     PadBasis(basis, &kept);
     PadBasis(basis, &joined.splats);
-    AppendSplats(
-        kept.view(), [](int64_t) { return true; }, &joined.splats);
+    AppendSplats(kept.view(), &joined.splats);
     joined.splats.background = splats.background;
     joined.fit_pixels.push_back(stored.field.geometry->splats.fit_pixel);
     joined.devices.insert(record.device);
@@ -163,10 +161,15 @@ void JoinBlocks(RunContext* context, const BlockFolder& folder) {
   const RunSettings& settings = context->settings;
   Workspace& workspace = *context->workspace;
   Console* const console = context->console;
-  if (const std::vector<int> missing = folder.Missing(); !missing.empty())
-    throw InputError(BlocksText(missing, folder.blocks()) + " missing", folder.path(),
+  if (const std::vector<int> missing = folder.Missing(); !missing.empty()) {
+    const std::string others =
+        std::ssize(missing) == folder.blocks() ? folder.OtherSettings() : "";
+    throw InputError(Concat(BlocksText(missing, folder.blocks(), " is missing", " are missing"),
+                            others.empty() ? "" : "; ", others),
+                     folder.path(),
                      "run `regrade refine DIR --part K/N` for each K; what is there is not "
                      "done again");
+  }
   const StageRecord before = *workspace.Find("reconstruct");
   const Backend backend = ChooseBackend(settings.run.device, settings.run.reproducible);
   console->BeginStage("refine", "joining the blocks of the field");
@@ -210,9 +213,9 @@ void JoinBlocks(RunContext* context, const BlockFolder& folder) {
   PutMetrics(metrics, &record.metrics);
   std::vector<std::string> outputs;
   for (const StageOutput& output : before.outputs) outputs.push_back(output.path);
-  const std::optional<double> cpu = before.cpu_seconds;
   ForgetStyles(workspace.folder());
-  workspace.Record("reconstruct", before.inputs, outputs, before.seconds, record.metrics, cpu);
+  workspace.Record("reconstruct", before.inputs, outputs, before.seconds, record.metrics,
+                   before.cpu_seconds);
   folder.Drop();
   for (int block = 0; block < folder.blocks(); ++block)
     workspace.DropCheckpoint(BlockStage(block));

@@ -9,7 +9,6 @@
 
 #include "evaluate/seen_by_few.h"
 #include "kernels/base/error.h"
-#include "kernels/base/hash.h"
 #include "pipeline/fields/film_timing.h"
 #include "pipeline/files/atomic_file.h"
 #include "pipeline/files/npz_file.h"
@@ -18,22 +17,18 @@
 #include "pipeline/stages/frame_writer.h"
 #include "pipeline/workspace/folder_lock.h"
 #include "pipeline/workspace/output_names.h"
+#include "pipeline/workspace/shared_work.h"
 
 namespace regrade {
 namespace {
 
 namespace fs = std::filesystem;
 
-constexpr char kUnitRecord[] = "unit.json", kSeenDepth[] = "seen.npz",
-               kInputs[] = "inputs.json";
+constexpr char kUnitRecord[] = "unit.json", kSeenDepth[] = "seen.npz";
 constexpr uint64_t kMostSeen = uint64_t{4} << 30, kMostPicture = uint64_t{1} << 32;
 
-std::string FolderOfParts(const RunContext& context) {
-  return context.style->Path(kPartsFolder);
-}
-
-std::string FolderOfInputs(const RunContext& context, const JsonValue& inputs) {
-  return FolderOfParts(context) + "/" + HashText(HashOf(DumpJson(inputs, -1)));
+SharedWork PartsOf(const RunContext& context, const JsonValue& inputs) {
+  return {context.style->Path(kPartsFolder), inputs};
 }
 
 bool IsThere(const std::string& folder, const FrameUnit& unit) {
@@ -98,13 +93,6 @@ struct UnitWork {
   }
 };
 
-// Several parts may begin at the same moment.
-void NoteInputs(const std::string& folder, const JsonValue& inputs) {
-  const std::string path = folder + "/" + kInputs, made = OwnTemporary(path);
-  WriteJsonFile(made, inputs);
-  RenameDurably(made, path);
-}
-
 std::string TextOf(const std::vector<FrameUnit>& units) {
   std::vector<std::string> texts;
   for (const FrameUnit& unit : units) texts.push_back(unit.Text());
@@ -131,14 +119,14 @@ void RenderPart(const Stage& stage, RunContext* context) {
   const std::string title = "part " + context->parts.part + " of the frames and films";
   StoredField before = ReadFieldFile(context->workspace->Path("field.npz"));
   const FramePlan plan = PlanFrames(*context, before);
-  const std::string folder = FolderOfInputs(*context, stage.inputs);
+  const SharedWork work = PartsOf(*context, stage.inputs);
+  const std::string& folder = work.path();
   std::vector<FrameUnit> units = UnitsOfPart(UnitsOf(plan.sets), context->parts.part);
   std::erase_if(units, [&](const FrameUnit& unit) { return IsThere(folder, unit); });
   if (units.empty()) return console->Info(title + ": nothing is left to do");
   if (context->settings.start.dry_run)
     return console->Info(title + ": would render " + TextOf(units));
-  MakeFolder(folder);
-  NoteInputs(folder, stage.inputs);
+  work.Begin();
   console->Info(title + ": " + TextOf(units));
   console->BeginStage("render", title);
   SceneFrames frames(context, plan, std::move(before), [](StoredField) {});
@@ -151,16 +139,6 @@ void RenderPart(const Stage& stage, RunContext* context) {
 }
 
 namespace {
-
-// Which parts of other settings there are.
-std::string OtherParts(const RunContext& context, const JsonValue& inputs) {
-  std::error_code error;
-  for (const auto& entry : fs::directory_iterator(FolderOfParts(context), error))
-    if (entry.path() != FolderOfInputs(context, inputs) && fs::exists(entry.path() / kInputs))
-      return "there are parts of other settings: " +
-             Join(Differences(ReadJsonFile((entry.path() / kInputs).string()), inputs), "; ");
-  return "";
-}
 
 // A link where the file system has them: the parts stay until all is done.
 void TakeOver(const fs::path& from, const fs::path& to) {
@@ -220,22 +198,22 @@ std::string TextOf(const std::set<std::string>& words) {
 }  // namespace
 
 void RequireParts(const Stage& stage, const RunContext& context) {
-  const JsonValue& inputs = stage.inputs;
+  const SharedWork work = PartsOf(context, stage.inputs);
   const FramePlan plan =
       PlanFrames(context, ReadFieldFile(context.workspace->Path("field.npz")));
   const std::vector<FrameUnit> units = UnitsOf(plan.sets);
-  const std::string folder = FolderOfInputs(context, inputs);
+  const std::string& folder = work.path();
   std::vector<FrameUnit> missing = units;
   std::erase_if(missing, [&](const FrameUnit& unit) { return IsThere(folder, unit); });
   if (missing.empty()) return;
   constexpr size_t kNamed = 4;
   const size_t count = missing.size();
   missing.resize(std::min(count, kNamed));
+  const std::string others = count == units.size() ? work.OtherSettings() : "";
   throw InputError(
-      Concat(count, " of ", units.size(), " groups of frames were not rendered: ",
-             TextOf(missing), count > kNamed ? ", ..." : "",
-             count == units.size() && !OtherParts(context, inputs).empty() ? "; " : "",
-             count == units.size() ? OtherParts(context, inputs) : ""),
+      Concat(count, " of ", units.size(),
+             " groups of frames were not rendered: ", TextOf(missing),
+             count > kNamed ? ", ..." : "", !others.empty() ? "; " : "", others),
       folder,
       "run `regrade render DIR --part K/N` for each K; what is there is not done again");
 }
@@ -243,7 +221,7 @@ void RequireParts(const Stage& stage, const RunContext& context) {
 JoinedParts JoinParts(const JsonValue& inputs, const FramePlan& plan, RunContext* context,
                       SeenByFewRecorder* seen) {
   const std::vector<FrameUnit> units = UnitsOf(plan.sets);
-  const std::string folder = FolderOfInputs(*context, inputs);
+  const std::string folder = PartsOf(*context, inputs).path();
   const Workspace& style = *context->style;
   JoinedParts joined;
   std::set<std::string> devices, renderers;
@@ -264,17 +242,12 @@ JoinedParts JoinParts(const JsonValue& inputs, const FramePlan& plan, RunContext
   return joined;
 }
 
-// Under another name first: what is half removed is no part.
 void DropParts(const JsonValue& inputs, const RunContext& context) {
-  const std::string folder = FolderOfInputs(context, inputs), gone = OwnTemporary(folder);
-  std::error_code error;
-  fs::rename(folder, gone, error);
-  fs::remove_all(gone, error);
-  fs::remove(FolderOfParts(context), error);  // if it is empty
+  PartsOf(context, inputs).Drop();
 }
 
 void WarnOfOtherParts(const JsonValue& inputs, const RunContext& context) {
-  if (const std::string others = OtherParts(context, inputs); !others.empty())
+  if (const std::string others = PartsOf(context, inputs).OtherSettings(); !others.empty())
     context.console->Warn("nothing is joined, for this film is there; " + others);
 }
 

@@ -10,7 +10,7 @@
 set -euo pipefail
 
 if [[ $# -lt 1 || $1 == --help ]]; then
-  sed -n '2,10s/^# \{0,1\}//p' "${BASH_SOURCE[0]}"
+  sed -n '2,9s/^# \{0,1\}//p' "${BASH_SOURCE[0]}"
   exit 0
 fi
 regrade=$(realpath "$1")
