@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "kernels/scene/camera.h"
+#include "kernels/scene/geo_position.h"
 #include "kernels/scene/image.h"
 #include "kernels/scene/photo_status.h"
 
@@ -20,10 +21,11 @@ struct StagedPhoto {
   std::string path;  // absolute path of the PNG
   int width = 0;     // pixels, after EXIF orientation
   int height = 0;
-  double exif_focal_px = 0;  // focal length in pixels from EXIF; 0 where unknown
-  int bits = 8;              // of a value in the PNG: 8 or 16
-  int clip = -1;             // index of the film that it is a frame of; -1: a photo
-  int orientation = 1;       // of EXIF, 1..8: how the file's pixels were turned
+  double exif_focal_px = 0;             // focal length in pixels from EXIF; 0 where unknown
+  int bits = 8;                         // of a value in the PNG: 8 or 16
+  int clip = -1;                        // index of the film that it is a frame of; -1: a photo
+  int orientation = 1;                  // of EXIF, 1..8: how the file's pixels were turned
+  std::optional<GeoPosition> gps = {};  // of EXIF
 };
 
 // A registered photo. `name` is the staged name ("00007.png"); `file` the user's.

@@ -243,7 +243,7 @@ class Ingest {
     result_.statuses.push_back({item.name, PhotoState::kUsed, notice});
     result_.photos.push_back({item.name, name, path, candidate.rgb.width, candidate.rgb.height,
                               candidate.photo.exif_focal_px, bits, item.clip,
-                              candidate.photo.orientation});
+                              candidate.photo.orientation, candidate.photo.gps});
     looks_.push_back({item.name, candidate.rgb.width, candidate.rgb.height,
                       candidate.photo.bits, candidate.photo.taken, candidate.photo.light,
                       candidate.look});

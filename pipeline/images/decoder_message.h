@@ -84,6 +84,8 @@ inline void PutPicture(const StoredPicture& picture, MessageWriter* message) {
        {picture.focal_mm, picture.focal_35mm, picture.focal_plane_px_per_mm, picture.exif_width,
         picture.clipped, picture.light})
     message->Put(value);
+  message->Put<uint8_t>(picture.gps ? 1 : 0);
+  if (picture.gps) message->Put(*picture.gps);
   for (const std::string& text : {picture.colors, picture.taken}) message->PutText(text);
   message->Put<uint64_t>(picture.notices.size());
   for (const std::string& notice : picture.notices) message->PutText(notice);
@@ -95,6 +97,7 @@ inline StoredPicture TakePicture(MessageReader* message) {
   for (double* value : {&picture.focal_mm, &picture.focal_35mm, &picture.focal_plane_px_per_mm,
                         &picture.exif_width, &picture.clipped, &picture.light})
     *value = message->Take<double>();
+  if (message->Take<uint8_t>() != 0) picture.gps = message->Take<GeoPosition>();
   for (std::string* text : {&picture.colors, &picture.taken}) *text = message->TakeText();
   for (uint64_t left = message->Take<uint64_t>(); left > 0; --left)
     picture.notices.push_back(message->TakeText());

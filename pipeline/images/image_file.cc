@@ -40,6 +40,7 @@ DecodedPhoto DecodePhoto(const std::string& path, const DecodeLimits& limits) {
   photo.bits = stored.bits;
   photo.orientation = stored.orientation;
   photo.taken = stored.taken;
+  photo.gps = stored.gps;
   photo.light = stored.light;
   photo.notice = Join(stored.notices, "; ");
   photo.colors = stored.colors;

@@ -6,8 +6,10 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 
+#include "kernels/scene/geo_position.h"
 #include "kernels/scene/image.h"
 #include "pipeline/images/picture_decoder.h"
 
@@ -19,8 +21,9 @@ struct DecodedPhoto {
   int bits = 8;              // per value in the file; 32 means floating point
   int orientation = 1;       // of EXIF, 1..8: how the stored pixels were turned
   std::string taken;         // EXIF's time, "2024:05:01 10:20:30.125"; empty where unknown
-  double light = 0;          // exposure time x sensitivity / f-number^2; 0 where unknown
-  std::string notice;        // remarks for the user; empty if none
+  std::optional<GeoPosition> gps;
+  double light = 0;    // exposure time x sensitivity / f-number^2; 0 where unknown
+  std::string notice;  // remarks for the user; empty if none
   // Of the conversion to sRGB (normalize_photo.h), apart from the notice, because many photos
   // share them.
   std::string colors;

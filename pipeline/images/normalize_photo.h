@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "kernels/scene/geo_position.h"
 #include "kernels/scene/image.h"
 
 namespace regrade {
@@ -27,6 +28,7 @@ struct StoredPicture {
   double focal_35mm = 0;             // EXIF FocalLengthIn35mmFilm
   double focal_plane_px_per_mm = 0;  // EXIF FocalPlaneXResolution
   double exif_width = 0;  // EXIF PixelXDimension: the width that these pixels refer to
+  std::optional<GeoPosition> gps;
   std::vector<std::string> notices;
   std::string colors;  // what the colours were converted from: "Display P3"; empty if unchanged
   double clipped = 0;  // fraction of the values that were outside [0, 1] then, and were clamped

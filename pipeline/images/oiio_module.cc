@@ -6,7 +6,10 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <memory>
+#include <optional>
+#include <string_view>
 #include <vector>
 
 #include "kernels/base/error.h"
@@ -28,6 +31,32 @@ double LightOf(const OIIO::ImageSpec& spec) {
   return seconds > 0 ? double{seconds} * sensitivity / (double{stop} * stop) : 0;
 }
 
+// Degrees, minutes and seconds under `name` as degrees, with the sign of their hemisphere;
+// nothing where a part is missing or out of range.
+std::optional<double> DegreesOf(const OIIO::ImageSpec& spec, const std::string& name,
+                                char negative, double limit) {
+  float parts[3] = {};
+  if (!spec.getattribute(name, OIIO::TypeDesc(OIIO::TypeDesc::FLOAT, 3), parts)) return {};
+  const double degrees = parts[0] + parts[1] / 60.0 + parts[2] / 3600.0;
+  if (!(degrees >= 0 && degrees <= limit)) return {};
+  const std::string_view half = spec.get_string_attribute(name + "Ref");
+  return half.starts_with(negative) ? -degrees : degrees;
+}
+
+std::optional<GeoPosition> PositionOf(const OIIO::ImageSpec& spec) {
+  const std::optional<double> latitude = DegreesOf(spec, "GPS:Latitude", 'S', 90),
+                              longitude = DegreesOf(spec, "GPS:Longitude", 'W', 180);
+  if (!latitude || !longitude) return {};
+  // Receivers without a fix write zeros.
+  if (*latitude == 0 && *longitude == 0) return {};
+  const float altitude = spec.get_float_attribute("GPS:Altitude");
+  const bool below = spec.get_int_attribute("GPS:AltitudeRef") == 1;
+  return GeoPosition{*latitude, *longitude,
+                     !std::isfinite(altitude) ? 0
+                     : below                  ? -altitude
+                                              : altitude};
+}
+
 // Metadata under OpenImageIO's names.
 void TakeMetadata(const OIIO::ImageSpec& spec, StoredPicture* picture) {
   const int orientation = spec.get_int_attribute("Orientation", 1);
@@ -36,6 +65,7 @@ void TakeMetadata(const OIIO::ImageSpec& spec, StoredPicture* picture) {
   const std::string fraction = spec.get_string_attribute("Exif:SubsecTimeOriginal");
   if (!picture->taken.empty() && !fraction.empty()) picture->taken += "." + fraction;
   picture->light = LightOf(spec);
+  picture->gps = PositionOf(spec);
   picture->focal_mm = spec.get_float_attribute("Exif:FocalLength");
   picture->focal_35mm = spec.get_float_attribute("Exif:FocalLengthIn35mmFilm");
   picture->exif_width = spec.get_float_attribute("Exif:PixelXDimension");

@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "kernels/base/error.h"
+#include "pipeline/files/text.h"
 #include "pipeline/run/splat_fit.h"
 #include "pipeline/run/voxel_fit.h"
 
@@ -20,9 +21,24 @@ const FitKind& FitKindOf(const RunSettings& settings) {
   return **kind;
 }
 
+int64_t OnePhotoIn(const RunSettings& settings, const FitPlace& place) {
+  return OnePhotoIn(place, [&settings](const FitPlace& of) {
+    return FitKindOf(settings).plan(settings, of);
+  });
+}
+
 std::string MemoryWarning(const RunSettings& settings, const FitPlace& place) {
   try {
-    return FitKindOf(settings).lowered(settings, place);
+    const int64_t one_in = OnePhotoIn(settings, place);
+    FitPlace fitted = place;
+    fitted.pixels /= one_in;
+    fitted.photos = (place.photos + one_in - 1) / one_in;
+    std::vector<std::string> sentences;
+    if (one_in > 1) sentences.push_back(FewerPhotosText(one_in, fitted.photos, place));
+    if (const std::string lowered = FitKindOf(settings).lowered(settings, fitted);
+        !lowered.empty())
+      sentences.push_back(lowered);
+    return Join(sentences, "; ");
   } catch (const Error& error) {
     if (error.code() != ExitCode::kResources) throw;
     return error.what_failed() + (error.hint().empty() ? "" : ": " + error.hint());

@@ -45,8 +45,11 @@ const std::array<const FitKind*, 2>& FitKinds();
 // Of the field that the settings name.
 const FitKind& FitKindOf(const RunSettings& settings);
 
+// One photo in so many is fitted to the settings' field, as the function of that name says.
+int64_t OnePhotoIn(const RunSettings& settings, const FitPlace& place);
+
 // What a person should know of the fit's memory before it begins: that less than it takes is
-// free, and what it is lowered to; or nothing.
+// free, how many photos of the place's it is left, and what it is lowered to; or nothing.
 std::string MemoryWarning(const RunSettings& settings, const FitPlace& place);
 
 }  // namespace regrade

@@ -3,6 +3,7 @@
 #include <omp.h>
 
 #include <algorithm>
+#include <cmath>
 #include <utility>
 
 #include "kernels/base/error.h"
@@ -12,6 +13,9 @@
 
 namespace regrade {
 namespace {
+
+constexpr int64_t kLeastPhotos = 20;    // that are left of many
+constexpr double kMostOfMemory = 0.75;  // for photos
 
 int Finest(const FitOptions& options) { return *std::ranges::max_element(options.resolutions); }
 
@@ -60,6 +64,25 @@ StagePlan PlanFitAt(const FitPlace& place, const FitOptions& options) {
 FitOptions AdaptedTo(const FitOptions& options, const FitPlace& place) {
   return AdaptOptions(options,
                       {.on_card = place.backend == Backend::kCuda, .pixels = place.pixels});
+}
+
+int64_t OnePhotoIn(const FitPlace& place,
+                   const std::function<StagePlan(const FitPlace&)>& plan) {
+  if (!MayLower(place)) return 1;
+  FitPlace half = place;
+  half.pixels /= 2, half.photos /= 2;
+  const auto memory = [&plan](const FitPlace& of) {
+    return static_cast<double>(plan(of).memory);
+  };
+  const double of_photos = 2 * (memory(place) - memory(half));
+  const double room = kMostOfMemory * static_cast<double>(LimitOf(place));
+  return std::clamp<int64_t>(std::llround(std::ceil(of_photos / room)), 1,
+                             std::max<int64_t>(1, place.photos / kLeastPhotos));
+}
+
+std::string FewerPhotosText(int64_t one_in, int64_t fitted, const FitPlace& place) {
+  return Concat("one photo in ", one_in, " is fitted, ", fitted, " of ", place.photos) +
+         ToFitInto(place);
 }
 
 PlannedFit FitWithinMemory(FitOptions options, const FitPlace& place) {

@@ -30,9 +30,9 @@ constexpr double kAfterFit =
     0.08;  // pruning, writing and measuring, as a fraction of the steps' time
 constexpr double kTrial = 0.08;  // the trial of degrees, likewise
 
-int64_t PixelsToFit(const WorkingViews& views) {
+int64_t PixelsOf(const WorkingViews& views, const std::vector<int>& photos) {
   int64_t pixels = 0;
-  for (const int i : views.Training()) {
+  for (const int i : photos) {
     const Camera camera = views.CameraOf(i);
     pixels += int64_t{camera.width} * camera.height;
   }
@@ -40,13 +40,22 @@ int64_t PixelsToFit(const WorkingViews& views) {
 }
 
 FitPlace PlaceOf(const RunSettings& settings, const WorkingViews& views,
-                 const NormalizedScene& scene) {
+                 const std::vector<int>& photos, const NormalizedScene& scene) {
   return {.backend = ChooseBackend(settings.run.device, settings.run.reproducible),
-          .pixels = PixelsToFit(views),
-          .photos = std::ssize(views.Training()),
+          .pixels = PixelsOf(views, photos),
+          .photos = std::ssize(photos),
           .box = scene.box,
           .max_memory_gb = settings.run.max_memory_gb,
           .reproducible = settings.run.reproducible};
+}
+
+// Of the photos that are not held out those that memory has room for.
+std::vector<int> PhotosWithinMemory(const RunSettings& settings, const FitPlace& of_all,
+                                    const std::vector<int>& all) {
+  const int64_t one_in = OnePhotoIn(settings, of_all);
+  std::vector<int> some;
+  for (size_t i = 0; i < all.size(); i += static_cast<size_t>(one_in)) some.push_back(all[i]);
+  return some;
 }
 
 // Decides whether the fit keeps its spherical harmonics, with the evidence.
@@ -100,12 +109,16 @@ StageOutcome Reconstruct(RunContext* context, const JsonValue& inputs,
   for (const EffectReport& effect : profile.effects)
     if (effect.name != kViewDependence) context->console->Detail(EffectLine(effect));
   for (const std::string& notice : profile.notices) context->console->Info(notice);
-  const FitPlace place = PlaceOf(settings, views, scene);
+  const std::vector<int> all = views.Training();
+  const FitPlace of_all = PlaceOf(settings, views, all, scene);
+  const std::vector<int> training = PhotosWithinMemory(settings, of_all, all);
+  const FitPlace place = PlaceOf(settings, views, training, scene);
   const Backend backend = place.backend;
+  if (training.size() < all.size())
+    context->console->Info(FewerPhotosText(OnePhotoIn(settings, of_all), place.photos, of_all));
   const std::unique_ptr<FieldFit> fit = FitKindOf(settings).make(settings, place);
   for (const std::string& sentence : fit->FitIntoMemory()) context->console->Info(sentence);
 
-  const std::vector<int> training = views.Training();
   std::vector<Image> photos;
   photos.reserve(training.size());
   std::vector<TrainingView> training_views;
@@ -213,12 +226,15 @@ Stage ReconstructStage(RunContext* context) {
   stage.refuse_changes = true;
   if (context->settings.start.dry_run) {
     const WorkingViews views = context->Views();
-    const FitPlace place =
-        PlaceOf(context->settings, views, SceneOfRun(context->settings, views.capture()));
+    const std::vector<int> all = views.Training();
+    const NormalizedScene scene = SceneOfRun(context->settings, views.capture());
+    const FitPlace of_all = PlaceOf(context->settings, views, all, scene);
+    const FitPlace place = PlaceOf(context->settings, views,
+                                   PhotosWithinMemory(context->settings, of_all, all), scene);
     stage.plan = "about " +
                  SizeText(FitKindOf(context->settings).plan(context->settings, place).memory) +
                  " of memory";
-    if (const std::string warning = MemoryWarning(context->settings, place); !warning.empty())
+    if (const std::string warning = MemoryWarning(context->settings, of_all); !warning.empty())
       stage.plan_warnings.push_back(warning);
   }
   stage.work = [context, inputs = stage.inputs](const ProgressFunction& progress) {

@@ -13,6 +13,7 @@
 #include "reconstruct/colmap/colmap_model.h"
 #include "reconstruct/colmap/colmap_program.h"
 #include "reconstruct/colmap/listed_pairs.h"
+#include "reconstruct/colmap/place_pairs.h"
 #include "reconstruct/colmap/pose_weights.h"
 #include "reconstruct/scene/scene_checks.h"
 
@@ -133,8 +134,12 @@ class AttemptRunner::Impl {
   }
 
   ColmapPaths PathsOf(const std::string& attempt_folder) const {
-    return {photo_folder_, attempt_folder + "/database.db", attempt_folder + "/images.txt",
-            attempt_folder + "/sparse", options_.mask_folder};
+    return {photo_folder_,
+            attempt_folder + "/database.db",
+            attempt_folder + "/images.txt",
+            attempt_folder + "/sparse",
+            attempt_folder + "/vocabulary.bin",
+            options_.mask_folder};
   }
 
   void Extract(const PoseStrategy& strategy, const CameraGroup& group, const ColmapPaths& paths,
@@ -154,11 +159,24 @@ class AttemptRunner::Impl {
   }
 
   void Match(const PoseStrategy& strategy, const ColmapPaths& paths, double weight) {
-    if (!strategy.by_list)
-      return RunStage(MatchCommand(strategy), MatchArguments(strategy, threads_, paths),
-                      "matching", strategy.name, weight);
-    MatchListed(PairsOfClips(photos_), photos_, paths.database, attempt_folder_ + "/pairs.txt",
-                threads_, [&](const ColmapArguments& arguments, double fraction) {
+    if (strategy.pairing != Pairing::kListed) {
+      const std::vector<MatchStep> steps = MatchSteps(strategy, threads_, paths);
+      for (const MatchStep& step : steps) {
+        try {
+          RunStage(step.command, step.arguments, "matching", strategy.name,
+                   weight * step.weight);
+        } catch (const Error& e) {
+          if (e.code() != ExitCode::kExternalProgram || &step == &steps.front()) throw;
+          report_.notes.push_back(
+              "photos are matched in the order of their names only, since " + e.what_failed());
+          return;
+        }
+      }
+      return;
+    }
+    MatchListed(HasClips(photos_) ? PairsOfClips(photos_) : PairsOfPlaces(photos_), photos_,
+                paths.database, attempt_folder_ + "/pairs.txt", threads_,
+                [&](const ColmapArguments& arguments, double fraction) {
                   RunStage(kListMatcher, arguments, "matching", strategy.name,
                            weight * fraction);
                 });
@@ -171,7 +189,9 @@ class AttemptRunner::Impl {
         MapArguments(attempt.strategy, static_cast<int>(photos_.size()), threads_, paths);
     fs::remove_all(paths.model);
     fs::create_directories(paths.model);
+    // A lens that is given is a model to start from, which parts have not.
     if (attempt.freedom != LensFreedom::kFull) {
+      attempt.strategy.in_parts = false;
       const std::string start = attempt.folder + "/start", output = paths.model + "/0";
       fs::create_directories(start);
       fs::create_directories(output);
@@ -179,7 +199,7 @@ class AttemptRunner::Impl {
       MapFrom(start, output, attempt.freedom, &arguments);
     }
     const ChildResult result =
-        RunColmap("mapper", arguments, "mapping", attempt.Name(), weight);
+        RunColmap(MapCommand(attempt.strategy), arguments, "mapping", attempt.Name(), weight);
     attempt.evidence = output_.evidence();
     std::string damage;
     std::set<fs::path> folders;

@@ -4,6 +4,7 @@
 
 #include "kernels/base/error.h"
 #include "reconstruct/colmap/listed_pairs.h"
+#include "reconstruct/colmap/place_pairs.h"
 
 namespace regrade {
 namespace {
@@ -19,8 +20,23 @@ constexpr size_t kFewPhotos = 20;
 constexpr size_t kFewPairs = 15;
 // The cost of matching all pairs grows with the square.
 constexpr size_t kMostForAllPairs = 150;
+// Of many photos, each is matched with so many that look most like it.
+constexpr int kSimilarPhotos = 20;
+// The vocabulary is learned from the features of so many photos.
+constexpr int kPhotosOfVocabulary = 200, kVisualWords = 16384;
+// The global adjustments of one mapper cost more and more. Above so many photos, they are
+// mapped in parts of at most so many, of which neighbours share so many.
+constexpr size_t kMostForOneMapper = 600;
+constexpr int kPhotosOfPart = 250, kSharedPhotos = 50;
 
 std::string Text(double value) { return Format("%.9g", value); }
+
+Pairing PairingOf(const std::vector<StagedPhoto>& photos, size_t all_pairs_up_to) {
+  if (photos.size() <= all_pairs_up_to) return Pairing::kAll;
+  if (HasClips(photos)) return Pairing::kListed;
+  if (photos.size() <= kMostForAllPairs) return Pairing::kOrder;
+  return PlacesTellPhotosApart(photos) ? Pairing::kListed : Pairing::kSimilar;
+}
 
 }  // namespace
 
@@ -50,8 +66,8 @@ std::vector<PoseStrategy> PoseStrategies(const std::vector<StagedPhoto>& photos,
   if (photos.size() <= kFewPairs) quick.max_features = 4096;
   quick.first_octave = side < kSmallSide || photos.size() <= kFewPairs ? -1 : 0;
   quick.lens = simple_lens ? ColmapLens::kSimpleRadial : ColmapLens::kOpenCv;
-  quick.all_pairs = static_cast<int>(photos.size()) <= all_pairs_up_to;
-  quick.by_list = !quick.all_pairs && HasClips(photos);
+  quick.pairing = PairingOf(photos, static_cast<size_t>(all_pairs_up_to));
+  quick.in_parts = photos.size() > kMostForOneMapper;
 
   PoseStrategy finer = quick;
   finer.name = "more features";
@@ -68,9 +84,9 @@ std::vector<PoseStrategy> PoseStrategies(const std::vector<StagedPhoto>& photos,
   PoseStrategy thorough = relaxed;
   thorough.name = "all pairs, wider lens";
   thorough.keep_matches = false;
-  thorough.max_features = quick.all_pairs ? 8192 : 4096;
-  thorough.all_pairs = photos.size() <= kMostForAllPairs;
-  thorough.by_list = !thorough.all_pairs && quick.by_list;
+  thorough.max_features = quick.pairing == Pairing::kAll ? 8192 : 4096;
+  if (photos.size() <= kMostForAllPairs) thorough.pairing = Pairing::kAll;
+  thorough.in_parts = false;
   thorough.lens = ColmapLens::kSimpleRadial;
   thorough.focal_factor = 0.75;
   return {quick, finer, relaxed, thorough};
@@ -102,27 +118,44 @@ ColmapArguments ExtractArguments(const PoseStrategy& strategy, const CameraGroup
   return arguments;
 }
 
-std::string MatchCommand(const PoseStrategy& strategy) {
-  return strategy.all_pairs ? "exhaustive_matcher" : "sequential_matcher";
-}
-
-ColmapArguments MatchArguments(const PoseStrategy& strategy, int threads,
-                               const ColmapPaths& paths) {
-  ColmapArguments arguments = {
+std::vector<MatchStep> MatchSteps(const PoseStrategy& strategy, int threads,
+                                  const ColmapPaths& paths) {
+  const ColmapArguments common = {
       {"database_path", paths.database},
       {"SiftMatching.use_gpu", "0"},
       {"SiftMatching.num_threads", std::to_string(threads > 0 ? threads : -1)},
   };
-  if (strategy.all_pairs)
-    arguments.push_back({"ExhaustiveMatching.block_size", std::to_string(kBlockSize)});
-  else
-    arguments.push_back({"SequentialMatching.overlap", std::to_string(kOverlap)});
-  return arguments;
+  const auto with = [&common](ColmapArguments more) {
+    more.insert(more.begin(), common.begin(), common.end());
+    return more;
+  };
+  if (strategy.pairing == Pairing::kAll)
+    return {{"exhaustive_matcher",
+             with({{"ExhaustiveMatching.block_size", std::to_string(kBlockSize)}})}};
+  const MatchStep in_order = {"sequential_matcher",
+                              with({{"SequentialMatching.overlap", std::to_string(kOverlap)}})};
+  if (strategy.pairing == Pairing::kOrder) return {in_order};
+  REGRADE_CHECK(strategy.pairing == Pairing::kSimilar);
+  return {{in_order.command, in_order.arguments, 0.3},
+          {"vocab_tree_builder",
+           {{"database_path", paths.database},
+            {"vocab_tree_path", paths.vocabulary},
+            {"num_visual_words", std::to_string(kVisualWords)},
+            {"max_num_images", std::to_string(kPhotosOfVocabulary)}},
+           0.1},
+          {"vocab_tree_matcher",
+           with({{"VocabTreeMatching.vocab_tree_path", paths.vocabulary},
+                 {"VocabTreeMatching.num_images", std::to_string(kSimilarPhotos)}}),
+           0.6}};
+}
+
+std::string MapCommand(const PoseStrategy& strategy) {
+  return strategy.in_parts ? "hierarchical_mapper" : "mapper";
 }
 
 ColmapArguments MapArguments(const PoseStrategy& strategy, int num_photos, int threads,
                              const ColmapPaths& paths) {
-  return {
+  ColmapArguments arguments = {
       {"database_path", paths.database},
       {"image_path", paths.photos},
       {"output_path", paths.model},
@@ -137,6 +170,11 @@ ColmapArguments MapArguments(const PoseStrategy& strategy, int num_photos, int t
       {"Mapper.init_min_num_inliers", std::to_string(strategy.init_inliers)},
       {"Mapper.abs_pose_min_num_inliers", std::to_string(strategy.min_inliers)},
   };
+  if (strategy.in_parts) {
+    arguments.push_back({"leaf_max_num_images", std::to_string(kPhotosOfPart)});
+    arguments.push_back({"image_overlap", std::to_string(kSharedPhotos)});
+  }
+  return arguments;
 }
 
 }  // namespace regrade

@@ -11,14 +11,22 @@
 
 namespace regrade {
 
+// Which photos are matched with which.
+enum class Pairing {
+  kAll,     // all with all
+  kOrder,   // each with its neighbours in the order of names
+  kListed,  // the pairs of ListedPairs
+  kSimilar  // as kOrder, and each with those that look most like it, by a vocabulary tree
+};
+
 struct PoseStrategy {
   std::string name;
   int max_features = 2048;  // per photo
   int first_octave = 0;     // -1 upsamples the photo by 2: more and finer features
   ColmapLens lens = ColmapLens::kOpenCv;  // of the mapper; the final lens is fitted later
-  double focal_factor = 1.2;   // initial focal length over the longer side, without EXIF
-  bool all_pairs = true;       // otherwise each photo with its successors ...
-  bool by_list = false;        // ... or, of films, the pairs of listed_pairs.h
+  double focal_factor = 1.2;  // initial focal length over the longer side, without EXIF
+  Pairing pairing = Pairing::kAll;
+  bool in_parts = false;       // mapped in overlapping parts that are joined
   bool keep_matches = false;   // reuse features and matches of the previous attempt
   double init_angle_deg = 16;  // least angle between the rays of the first two photos
   int init_inliers = 100;      // least matches between them
@@ -37,22 +45,29 @@ struct CameraGroup {
 // frames of films, which a camera crops, share none with photos.
 std::vector<CameraGroup> GroupByCamera(const std::vector<StagedPhoto>& photos);
 
-// With more than `all_pairs_up_to` photos, each is matched with its neighbours in the order of
-// names, except in the last strategy; frames of films by the list of listed_pairs.h.
+// Up to `all_pairs_up_to` photos are matched all with all; frames of films, and many photos
+// that know their places, by a list; others in the order of names, and many of them by
+// likeness, too. The last strategy takes all pairs where they are not too many.
 std::vector<PoseStrategy> PoseStrategies(const std::vector<StagedPhoto>& photos,
                                          int all_pairs_up_to);
 
 struct ColmapPaths {
-  std::string photos, database, image_list, model;
+  std::string photos, database, image_list, model, vocabulary;
   std::string masks;  // folder; empty: none
 };
 
 // The command lines of one strategy. `threads` 0: COLMAP chooses.
 ColmapArguments ExtractArguments(const PoseStrategy& strategy, const CameraGroup& group,
                                  int max_image_size, int threads, const ColmapPaths& paths);
-std::string MatchCommand(const PoseStrategy& strategy);
-ColmapArguments MatchArguments(const PoseStrategy& strategy, int threads,
-                               const ColmapPaths& paths);
+// For listed pairs MatchListed runs the commands instead.
+struct MatchStep {
+  std::string command;
+  ColmapArguments arguments;
+  double weight = 1;  // fraction of the time
+};
+std::vector<MatchStep> MatchSteps(const PoseStrategy& strategy, int threads,
+                                  const ColmapPaths& paths);
+std::string MapCommand(const PoseStrategy& strategy);
 ColmapArguments MapArguments(const PoseStrategy& strategy, int num_photos, int threads,
                              const ColmapPaths& paths);
 

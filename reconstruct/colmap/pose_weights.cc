@@ -23,7 +23,9 @@ double Megapixels(const std::vector<StagedPhoto>& photos, int image_size) {
 PoseWeights EstimateWeights(const PoseStrategy& strategy,
                             const std::vector<StagedPhoto>& photos, int image_size) {
   const double n = static_cast<double>(photos.size());
-  const double pairs = strategy.all_pairs ? n * (n - 1) / 2 : std::min(10.0, n) * n;
+  const bool many = strategy.pairing == Pairing::kSimilar;
+  const double pairs =
+      strategy.pairing == Pairing::kAll ? n * (n - 1) / 2 : std::min(many ? 30.0 : 10.0, n) * n;
   const double size = strategy.max_features / 2048.0;
   const double pixels = Megapixels(photos, image_size) * (strategy.first_octave < 0 ? 4 : 1);
   return {strategy.keep_matches ? 0 : 0.27 * pixels,

@@ -106,8 +106,8 @@ class PoseFinder {
       last = FoundAllFeatures(strategy, runner_->evidence()) ? &strategy : nullptr;
       // Too few pairs connect the photos, and there are no more features.
       const int pairs = runner_->evidence().matched_pairs;
-      if (best.models.empty() && last != nullptr && strategy.all_pairs && pairs >= 0 &&
-          pairs < static_cast<int>(photos_.size()) - 1)
+      if (best.models.empty() && last != nullptr && strategy.pairing == Pairing::kAll &&
+          pairs >= 0 && pairs < static_cast<int>(photos_.size()) - 1)
         break;
       if (runner_->TimeIsOver()) break;
     }
@@ -120,7 +120,7 @@ class PoseFinder {
 
   // True if `next` would repeat the search of `last`, which found all features.
   static bool IsSameSearch(const PoseStrategy& last, const PoseStrategy& next) {
-    return !next.keep_matches && next.all_pairs == last.all_pairs && next.lens == last.lens &&
+    return !next.keep_matches && next.pairing == last.pairing && next.lens == last.lens &&
            next.focal_factor == last.focal_factor && next.init_angle_deg == last.init_angle_deg;
   }
 

@@ -5,8 +5,8 @@
 
 #include "kernels/field/field_kind.h"
 #include "kernels/field/spherical_harmonics.h"
+#include "kernels/scene/nearest_points.h"
 #include "stylize/field/lipschitz_network.h"
-#include "stylize/field/nearest_points.h"
 
 namespace regrade {
 namespace {

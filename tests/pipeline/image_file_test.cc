@@ -13,6 +13,7 @@
 
 #include "tests/pipeline/libjpeg_file.h"
 #include "tests/pipeline/picture_corpus.h"
+#include "tests/support/data.h"
 
 namespace regrade {
 namespace {
@@ -20,6 +21,7 @@ namespace {
 using testing::Contains;
 using testing::ExifBlock;
 using testing::FloatTiff;
+using testing::GpsBlock;
 using testing::LibjpegFile;
 using testing::MaxDifference;
 using testing::Photo;
@@ -225,6 +227,35 @@ TEST_F(ImageFile, FocalLengthFromExif) {
   EXPECT_EQ(focal(ExifBlock(1, 0)), 0);
   EXPECT_EQ(focal(ExifBlock(1, 60000)), 0) << "nonsense";
   EXPECT_EQ(DecodePhoto(Put("n.jpg", jpeg)).exif_focal_px, 0);
+}
+
+TEST_F(ImageFile, PlacesFromExif) {
+  const std::string jpeg = EncodeJpeg(Photo(96, 64, 1), 80);
+  const auto place = [&](const std::string& exif) {
+    return DecodePhoto(Put("g.jpg", WithSegment(jpeg, 0xe1, exif))).gps;
+  };
+  const auto south = place(GpsBlock('S', {33, 51, 3540}, 'W', {151, 12, 4000}, true, 12));
+  ASSERT_TRUE(south.has_value());
+  EXPECT_NEAR(south->latitude, -(33 + 51 / 60.0 + 35.4 / 3600), 1e-7);
+  EXPECT_NEAR(south->longitude, -(151 + 12 / 60.0 + 40 / 3600.0), 1e-6);
+  EXPECT_EQ(south->altitude, -12);
+  const auto north = place(GpsBlock('N', {46, 50, 0}, 'E', {7, 0, 0}, false, 198));
+  ASSERT_TRUE(north.has_value());
+  EXPECT_NEAR(north->latitude, 46 + 50 / 60.0, 1e-6);
+  EXPECT_EQ(north->longitude, 7);
+  EXPECT_EQ(north->altitude, 198);
+  EXPECT_FALSE(place(GpsBlock('N', {0, 0, 0}, 'E', {0, 0, 0}, false, 0))) << "no fix";
+  EXPECT_FALSE(place(GpsBlock('N', {91, 0, 0}, 'E', {7, 0, 0}, false, 0)));
+  EXPECT_FALSE(place(ExifBlock(1, 28)));
+}
+
+TEST_F(ImageFile, PlaceOfADrone) {
+  REGRADE_NEED_DATA("drone_beach/DJI_0018.JPG");
+  const auto gps = DecodePhoto(testing::DataPath("drone_beach/DJI_0018.JPG")).gps;
+  ASSERT_TRUE(gps.has_value());
+  EXPECT_NEAR(gps->latitude, 46 + 50 / 60.0 + 33.3855 / 3600, 1e-7);
+  EXPECT_NEAR(gps->longitude, -(91 + 59 / 60.0 + 40.4156 / 3600), 1e-6);
+  EXPECT_NEAR(gps->altitude, 198.309, 1e-3);
 }
 
 TEST_F(ImageFile, H143_NanIsRefusedAndOutOfRangeClamped) {

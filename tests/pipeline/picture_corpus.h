@@ -5,6 +5,7 @@
 #include <stdlib.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <filesystem>
 #include <fstream>
@@ -93,6 +94,22 @@ inline std::string ExifBlock(int orientation, int focal_35mm, int focal_mm = 0,
           TiffEntry(0xa405, 3, 1, focal_35mm) + Little(0, 4);
   tiff += Little(focal_mm, 4) + Little(1, 4) + Little(sensor_px_per_cm, 4) + Little(1, 4);
   return std::string("Exif\0\0", 6) + tiff;
+}
+
+// An EXIF block of a place: degrees, minutes and hundredths of a second; meters.
+inline std::string GpsBlock(char north, const std::array<int, 3>& latitude, char east,
+                            const std::array<int, 3>& longitude, bool below, int altitude) {
+  const auto fractions = [](const std::array<int, 3>& angle) {
+    return Little(angle[0], 4) + Little(1, 4) + Little(angle[1], 4) + Little(1, 4) +
+           Little(angle[2], 4) + Little(100, 4);
+  };
+  const uint32_t gps = 8 + 2 + 12 + 4, values = gps + 2 + 6 * 12 + 4;
+  return std::string("Exif\0\0II*\0", 10) + Little(8, 4) + Little(1, 2) +
+         TiffEntry(0x8825, 4, 1, gps) + Little(0, 4) + Little(6, 2) +
+         TiffEntry(1, 2, 2, north) + TiffEntry(2, 5, 3, values) + TiffEntry(3, 2, 2, east) +
+         TiffEntry(4, 5, 3, values + 24) + TiffEntry(5, 1, 1, below) +
+         TiffEntry(6, 5, 1, values + 48) + Little(0, 4) + fractions(latitude) +
+         fractions(longitude) + Little(altitude, 4) + Little(1, 4);
 }
 
 // A JPEG with the segment inserted after its first two bytes.

@@ -158,6 +158,30 @@ TEST(Plan, SplatsAreLoweredToMemory) {
   EXPECT_NE(lowered.notice, "");
 }
 
+// Photos of a street that take more than a given memory are thinned, and never to fewer than
+// a scene needs; without a limit of its own a reproducible fit keeps them all.
+TEST(Plan, PhotosAreThinnedToMemory) {
+  SplatFitOptions options;
+  options.thousands = 100, options.sh_degree = 2, options.steps = 100;
+  const auto plan = [&options](const FitPlace& of) {
+    return PlanSplatFit(options, of.pixels, of.photos, 2);
+  };
+  FitPlace place{.pixels = int64_t{4000} * 800 * 600, .photos = 4000};
+  const double all = static_cast<double>(plan(place).memory);
+  place.max_memory_gb = 2e-9 * all;
+  EXPECT_EQ(OnePhotoIn(place, plan), 1);
+  place.max_memory_gb = 0.5e-9 * all;
+  const int64_t one_in = OnePhotoIn(place, plan);
+  EXPECT_EQ(one_in, 3);
+  FitPlace thinned = place;
+  thinned.pixels /= one_in, thinned.photos /= one_in;
+  EXPECT_LT(static_cast<double>(plan(thinned).memory), place.max_memory_gb * 1e9);
+  place.max_memory_gb = 1e-9;
+  EXPECT_EQ(OnePhotoIn(place, plan), 200);
+  place.max_memory_gb = 0, place.reproducible = true;
+  EXPECT_EQ(OnePhotoIn(place, plan), 1);
+}
+
 // A splat for each 15 pixels is enough.
 TEST(Plan, FewPixelsHaveFewSplats) {
   SplatFitOptions asked;

@@ -15,13 +15,13 @@ TEST(PoseStrategies, CostIncreases) {
   std::vector<StagedPhoto> photos(50);
   for (StagedPhoto& photo : photos) photo.width = 1920, photo.height = 1080;
   const std::vector<PoseStrategy> strategies = PoseStrategies(photos, 30);
-  EXPECT_FALSE(strategies[0].all_pairs);
+  EXPECT_EQ(strategies[0].pairing, Pairing::kOrder);
   EXPECT_EQ(strategies[0].first_octave, 0);
   EXPECT_GT(strategies[1].max_features, strategies[0].max_features);
   EXPECT_TRUE(strategies[2].keep_matches);
-  EXPECT_TRUE(strategies.back().all_pairs);
+  EXPECT_EQ(strategies.back().pairing, Pairing::kAll);
   photos.resize(11);
-  EXPECT_TRUE(PoseStrategies(photos, 30)[0].all_pairs);
+  EXPECT_EQ(PoseStrategies(photos, 30)[0].pairing, Pairing::kAll);
   EXPECT_EQ(PoseStrategies(photos, 30)[0].lens, ColmapLens::kSimpleRadial);
 }
 

@@ -36,6 +36,9 @@ class Poses : public ::testing::Test {
       photos.push_back({"IMG " + std::to_string(i) + ".jpg", StagedName(i),
                         folder_ / "photos" / StagedName(i), 640, 480, exif_focal_px_, 8,
                         film_from_ >= 0 && i >= film_from_ ? 0 : -1});
+    if (meters_apart_ > 0)
+      for (int i = 0; i < count; ++i)
+        photos[static_cast<size_t>(i)].gps = GeoPosition{46 + i * meters_apart_ / 111195, 7, 0};
     return photos;
   }
 
@@ -65,7 +68,8 @@ class Poses : public ::testing::Test {
 
   fs::path folder_;
   double exif_focal_px_ = 0;
-  int film_from_ = -1;  // photos from this one on are frames of a film
+  double meters_apart_ = 0;  // places of the photos, in a row
+  int film_from_ = -1;       // photos from this one on are frames of a film
   PoseOptions options_;
   PoseReport report_;
   std::vector<PhotoStatus> statuses_;
@@ -129,6 +133,32 @@ TEST_F(Poses, F90_FramesOfAFilmAreMatchedByAList) {
   Run("good", 60);
   EXPECT_TRUE(fs::exists(folder_ / "work/attempt_2"));
   EXPECT_FALSE(fs::exists(folder_ / "work/attempt_2/pairs.txt"));
+}
+
+TEST_F(Poses, ManyPhotosAreMatchedByLikenessToo) {
+  EXPECT_EQ(Run("good", 160).views.size(), 160u);
+  EXPECT_TRUE(fs::exists(folder_ / "work/logs/vocab_tree_matcher.log"));
+  EXPECT_TRUE(fs::exists(folder_ / "work/logs/mapper.log"));
+  EXPECT_TRUE(report_.notes.empty());
+}
+
+TEST_F(Poses, WithoutAVocabularyTheOrderOfNamesIsLeft) {
+  EXPECT_EQ(Run("no-vocabulary", 160).views.size(), 160u);
+  ASSERT_EQ(report_.notes.size(), 1u);
+  EXPECT_NE(report_.notes[0].find("vocab_tree_builder"), std::string::npos);
+}
+
+TEST_F(Poses, VeryManyPhotosAreMappedInParts) {
+  EXPECT_EQ(Run("good", 1000).views.size(), 1000u);
+  EXPECT_TRUE(fs::exists(folder_ / "work/logs/hierarchical_mapper.log"));
+  EXPECT_FALSE(fs::exists(folder_ / "work/logs/mapper.log"));
+}
+
+TEST_F(Poses, ManyPhotosOfADroneAreMatchedByTheirPlaces) {
+  meters_apart_ = 25;
+  EXPECT_EQ(Run("good", 160).views.size(), 160u);
+  EXPECT_TRUE(fs::exists(folder_ / "work/logs/matches_importer.log"));
+  EXPECT_FALSE(fs::exists(folder_ / "work/logs/sequential_matcher.log"));
 }
 
 TEST_F(Poses, ProgressGrowsToItsTotal) {

@@ -48,6 +48,13 @@ std::vector<std::string> KnownOptions() {
           matching + "num_threads",
           "ExhaustiveMatching.block_size",
           "SequentialMatching.overlap",
+          "vocab_tree_path",
+          "num_visual_words",
+          "max_num_images",
+          "VocabTreeMatching.vocab_tree_path",
+          "VocabTreeMatching.num_images",
+          "leaf_max_num_images",
+          "image_overlap",
           "Mapper.num_threads",
           "Mapper.min_model_size",
           "Mapper.init_min_tri_angle",
@@ -282,9 +289,17 @@ int main(int argc, char** argv) {
   }
   if (Is("empty")) return 0;
   if (command == "feature_extractor") return Extract();
-  if (command == "mapper") return Map();
+  if (command == "mapper" || command == "hierarchical_mapper") return Map();
   if (command == "bundle_adjuster") return Adjust();
   if (command == "point_triangulator") return Triangulate();
+  if (command == "vocab_tree_builder") {
+    if (Is("no-vocabulary")) return 1;
+    std::ofstream(arguments["vocab_tree_path"]) << "words\n";
+    return 0;
+  }
+  if (command == "vocab_tree_matcher" &&
+      !fs::exists(arguments["VocabTreeMatching.vocab_tree_path"]))
+    return 1;
   CheckGpu("Matching");
   std::printf("Matching block [1/1, 1/1] in 0.001s\n");
   return 0;

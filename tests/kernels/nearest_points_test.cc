@@ -1,5 +1,5 @@
 // The nearest points of a k-d tree against all distances.
-#include "stylize/field/nearest_points.h"
+#include "kernels/scene/nearest_points.h"
 
 #include <gtest/gtest.h>
 

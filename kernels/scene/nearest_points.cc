@@ -1,4 +1,4 @@
-#include "stylize/field/nearest_points.h"
+#include "kernels/scene/nearest_points.h"
 
 #include <algorithm>
 #include <numeric>
