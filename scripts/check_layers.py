@@ -69,7 +69,6 @@ LAYERS = {
     "pipeline/report": 3,
     "pipeline/run": 4,
     "pipeline/synth": 4,
-    "pipeline/gpu": 5,
     "pipeline/stages": 6,
     "pipeline/view": 6,
     "pipeline/tradeoff": 7,

@@ -2,7 +2,6 @@
 #pragma once
 
 #include <memory>
-#include <string>
 
 #include "kernels/device/backend.h"
 #include "kernels/field/radiance_field.h"
@@ -17,27 +16,15 @@ class FieldRenderer {
   FieldRenderer(const RadianceField& field, Backend backend)
       : renderer_(RenderKindOf(*field.geometry).make_renderer(field, backend)) {}
 
-  // Exact: single precision, every sample. A field of splats has no picture through a lens:
+  // In single precision, every sample. A field of splats has no picture through a lens:
   // its cameras are pinholes.
   RenderedView Render(const Camera& camera) const { return renderer_->Render(camera); }
 
   // This field's view, and the colours of another one of the same geometry on the same
-  // processor; exact. The CPU marches, or sorts splats, once for both.
+  // processor. The CPU marches, or sorts splats, once for both.
   RenderedPair RenderWith(const FieldRenderer& other, const Camera& camera) const {
     return renderer_->RenderWith(*other.renderer_, camera);
   }
-
-  // Prepares the fast renderer: on a GPU a copy of a field of voxels in half precision. Returns
-  // why there is none, or an empty text.
-  std::string PrepareFast() { return renderer_->PrepareFast(); }
-  // Frees that memory.
-  void ForgetFast() { renderer_->ForgetFast(); }
-  // As RenderWith; both are prepared, and the camera has no distortion.
-  RenderedPair RenderFastWith(const FieldRenderer& other, const Camera& camera) const {
-    return renderer_->RenderFastWith(*other.renderer_, camera);
-  }
-  // How RenderFastWith differs from RenderWith.
-  std::string FastText() const { return renderer_->FastText(); }
 
  private:
   std::unique_ptr<KindRenderer> renderer_;

@@ -1,8 +1,6 @@
 // Renders one kind of field on one processor; see FieldRenderer, which has one of two.
 #pragma once
 
-#include <string>
-
 #include "kernels/field/cpu/render_view.h"
 #include "kernels/scene/camera.h"
 
@@ -13,11 +11,6 @@ class KindRenderer {
   virtual ~KindRenderer() = default;
   virtual RenderedView Render(const Camera& camera) const = 0;
   virtual RenderedPair RenderWith(const KindRenderer& other, const Camera& camera) const = 0;
-  virtual std::string PrepareFast() = 0;
-  virtual void ForgetFast() = 0;
-  virtual RenderedPair RenderFastWith(const KindRenderer& other,
-                                      const Camera& camera) const = 0;
-  virtual std::string FastText() const = 0;
 };
 
 }  // namespace regrade

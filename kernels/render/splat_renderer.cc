@@ -19,13 +19,6 @@ class SplatRenderer : public KindRenderer {
   explicit SplatRenderer(const RadianceField& field)
       : field_(field), options_(SplatOptionsOf(field_)) {}
 
-  RenderedPair RenderFastWith(const KindRenderer& other, const Camera& camera) const override {
-    return RenderWith(other, camera);
-  }
-  std::string PrepareFast() override { return ""; }
-  void ForgetFast() override {}
-  std::string FastText() const override { return "splats, as exactly as the views"; }
-
  protected:
   // Splats are in the world, whose rays need no device coordinates.
   static Camera PinholeOf(Camera camera) {

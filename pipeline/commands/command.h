@@ -84,7 +84,6 @@ void RunTradeoff(const Command&, const Arguments&, Console*);
 void RunStudy(const Command&, const Arguments&, Console*);
 void RunSynth(const Command&, const Arguments&, Console*);
 void RunExport(const Command&, const Arguments&, Console*);
-void RunPack(const Command&, const Arguments&, Console*);
 void RunPage(const Command&, const Arguments&, Console*);
 void RunView(const Command&, const Arguments&, Console*);
 void RunNetworks(const Command&, const Arguments&, Console*);

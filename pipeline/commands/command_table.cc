@@ -60,9 +60,6 @@ const std::vector<Command>& AllCommands() {
        "writes photos and poses for COLMAP, nerfstudio and instant-ngp, splats for viewers and "
        "engines, voxels for svox2 or as points, or a style as a LUT",
        RunExport},
-      {"pack", "DIR --out FILE [OPTIONS]",
-       "writes a posed capture as one file, for regrade_gpu on a bare GPU machine", RunPack,
-       "out preset style photo-size holdout effects verbose"},
       {"page", "DIR [STYLE ...] --out FILE.html [OPTIONS]",
        "writes the scene and its styles as one page, to walk through in a browser", RunPage},
       {"view", "DIR [STYLE ...] [OPTIONS]",

@@ -293,7 +293,6 @@ struct RenderReport {
   Metric path_transmittance, path_photo_distance;
   FilmSize film;
   double strength = 1;        // of the style, see EQ(style-mix)
-  std::string film_renderer;  // which renderer made the film, and why if it is the exact one
   Metric frames_per_second;
   SeenByFewMetrics seen_by_few;
 
@@ -311,7 +310,6 @@ struct RenderReport {
           {.label = "largest distance of its path to a photo", .unit = "photo spacings"});
     visit("film", film);
     visit("strength", strength, {.label = "strength of the style"});
-    visit("film_renderer", film_renderer, {.label = "renderer of the film", .optional = true});
     visit("frames_per_second", frames_per_second, {.label = "speed", .unit = "frames/s"});
     visit("seen_by_few", seen_by_few);
   }

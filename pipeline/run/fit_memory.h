@@ -1,5 +1,5 @@
 // What a fit of voxels or splats takes of the processor that it runs on, and what it is lowered
-// to where that is too much: one rule for `regrade run` and `regrade_gpu fit`.
+// to where that is too much.
 #pragma once
 
 #include <cstdint>

@@ -110,7 +110,6 @@ struct RenderOptions {
   double film_seconds = 10;
   int film_size = 1280;
   bool keep_exposure = false;
-  bool exact = false;
   std::string vignette = "none";
   PathOptions path;
   FilmChoice films;  // bound by itself: where films are made, stages know nothing of it
@@ -133,10 +132,6 @@ struct RenderOptions {
     bind("keep-exposure", keep_exposure,
          {.help = "renders frames at the photos' viewpoints with the exposure and white "
                   "balance of their photos, where these were undone"});
-    bind("exact", exact,
-         {.help = "renders the film's frames as exactly as the views; by default their smooth "
-                  "parts are interpolated, and a GPU renders voxels in half precision, "
-                  "with one colour for each 1/128 of opacity"});
     bind("vignette", vignette,
          {.help =
               "A,B multiplies the style's films and stills by 1 + A r^2 + B r^4, r from 0 at "

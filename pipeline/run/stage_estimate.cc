@@ -11,12 +11,12 @@ namespace regrade {
 namespace {
 
 // Seconds with two threads (AMD EPYC) for a million pixels: of files that are decoded, of
-// photos that the 2D method styles, of exact frames with both fields and the 2D method, of the
+// photos that the 2D method styles, of frames with both fields and the 2D method, of the
 // film's, and of compared pairs; and of a report with its page.
-constexpr double kDecode = 0.03, kStyle2d = 0.17, kExactFrame = 2.3, kFilmFrame = 0.75,
+constexpr double kDecode = 0.03, kStyle2d = 0.17, kFrame = 2.3, kFilmFrame = 0.75,
                  kPair = 0.55, kReport = 3, kPageOfMillionVoxels = 3.75;
 constexpr double kAroundFit = 1.16;        // the trial of degrees, pruning and measuring
-constexpr double kOfResidual = 1.5;        // of exact frames at the photos' places
+constexpr double kOfResidual = 1.5;        // of frames at the photos' places
 constexpr double kFasterOnCard = 1.0 / 8;  // training and frames, roughly
 
 double Scaled(double seconds, int threads) { return seconds * 2 / std::max(threads, 1); }
@@ -41,13 +41,13 @@ FitPlace PlaceOf(const RunSettings& settings, const CaptureSize& size, Backend b
 double RenderSeconds(const RunSettings& settings, const CaptureSize& size) {
   const RenderOptions& render = settings.render;
   const double photo = Megapixels(size, settings.scene.photo_size);
-  double exact = static_cast<double>(size.photos) * photo, film = 0;
+  double views = static_cast<double>(size.photos) * photo, film = 0;
   if (render.path.path != "views") {
-    exact += photo *
+    views += photo *
              static_cast<double>(SamplesOfFilm(render.film_seconds, render.fps).moments.size());
     film = FilmFrames(render.film_seconds, render.fps) * Megapixels(size, render.film_size);
   }
-  return kExactFrame * exact + (render.exact ? kExactFrame : kFilmFrame) * film;
+  return kFrame * views + kFilmFrame * film;
 }
 
 double EvaluateSeconds(const RunSettings& settings, const CaptureSize& size) {
@@ -107,7 +107,7 @@ std::vector<StageEstimate> EstimateStages(const RunSettings& settings, const Cap
   StagePlan stylize =
       PlanStyle(settings.network, kind.field(settings, place), 1e6 * photo, photos, threads);
   if (settings.residual.On())
-    stylize.seconds += Scaled(kOfResidual * kExactFrame * photos * photo, threads);
+    stylize.seconds += Scaled(kOfResidual * kFrame * photos * photo, threads);
   return {
       {"pose", PoseSeconds(size, threads)},
       {"reconstruct", kAroundFit * fit.seconds, fit.memory},

@@ -21,7 +21,7 @@
 #include "pipeline/workspace/output_names.h"
 #include "pipeline/workspace/stage_record.h"
 #include "stylize/image/color_transfer.h"
-#include "stylize/image/distribution_transfer.h"
+#include "stylize/image/sample_colors.h"
 #include "stylize/image/gaussian_mixture.h"
 #include "stylize/image/map_stylizer.h"
 #include "stylize/image/mixture_transfer.h"
@@ -55,11 +55,6 @@ std::unique_ptr<ViewStylizer> MakeColorMethod(StyleMethodKind kind, const StyleO
     std::vector<double> heights;
     const std::vector<Vec3d> scene = sample(kMixtureSample, &heights);
     return MakeMixtureTransfer(options, style, scene, heights);
-  }
-  if (kind == StyleMethodKind::kIdt || kind == StyleMethodKind::kHistogram) {
-    if (!options.scene_wide) return MakeDistributionTransfer(options, style);
-    const std::vector<Vec3d> scene = sample(4 * kColorSample);
-    return MakeDistributionTransfer(options, style, &scene);
   }
   if (!options.scene_wide) return MakeColorTransfer(options, style);
   std::vector<ColorStatistics> parts;

@@ -87,7 +87,6 @@ struct UnitWork {
     if (!seen_here.empty()) WriteSeen(made + "/" + kSeenDepth, seen_here);
     WriteJsonFile(made + "/" + kUnitRecord,
                   JsonValue::Object{{"device", frames->device()},
-                                    {"film_renderer", frames->film_renderer()},
                                     {"seconds", frames->seconds() - before}});
     PutInPlace(made, folder, unit);
   }
@@ -224,19 +223,17 @@ JoinedParts JoinParts(const JsonValue& inputs, const FramePlan& plan, RunContext
   const std::string folder = PartsOf(*context, inputs).path();
   const Workspace& style = *context->style;
   JoinedParts joined;
-  std::set<std::string> devices, renderers;
+  std::set<std::string> devices;
   for (const FrameUnit& unit : units) {
     const std::string of_unit = folder + "/" + unit.Name();
     const JsonValue record = ReadJsonFile(of_unit + "/" + kUnitRecord);
     devices.insert(record.At("device").AsString());
-    renderers.insert(record.At("film_renderer").AsString());
     joined.seconds += record.At("seconds").AsDouble();
     if (fs::exists(of_unit + "/frames")) TakeFrames(of_unit + "/frames", style.Path("frames"));
     ReadSeen(of_unit + "/" + kSeenDepth, unit, seen);
     if (unit.end == static_cast<int>(unit.set->cameras.size())) seen->Finish(*unit.set);
   }
   joined.device = TextOf(devices);
-  joined.film_renderer = TextOf(renderers);
   for (const char* name : {kStyledFilm, kWipeFilm, kViews2dFilm})
     if (JoinFilm(name, folder, units, style)) joined.films.push_back(name);
   return joined;

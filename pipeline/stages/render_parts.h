@@ -28,7 +28,7 @@ void RenderPart(const Stage& stage, RunContext* context);
 
 // What joining knows of how units were rendered.
 struct JoinedParts {
-  std::string device, film_renderer;  // of each kind, with commas between
+  std::string device;  // of each kind, with commas between
   double seconds = 0;                 // of rendering both fields
   std::vector<std::string> films;     // names of those that were made
 };

@@ -13,7 +13,6 @@
 #include "pipeline/fields/film_timing.h"
 #include "pipeline/report/stage_metrics.h"
 #include "pipeline/run/run_context.h"
-#include "pipeline/stages/film_renderer.h"
 #include "pipeline/stages/frame_units.h"
 #include "pipeline/stages/frame_writer.h"
 #include "pipeline/stages/render_parts.h"
@@ -93,7 +92,6 @@ JoinedParts RenderAll(const FramePlan& plan, SceneFrames* frames, RunContext* co
   if (plan.film() != nullptr) films.Finish(&rendered.films);
   if (!films.why_none().empty()) context->console->Warn("no film: " + films.why_none());
   rendered.device = frames->device();
-  rendered.film_renderer = frames->film_renderer();
   rendered.seconds = frames->seconds();
   return rendered;
 }
@@ -111,7 +109,6 @@ RenderReport ReportOf(const FramePlan& plan, const JoinedParts& rendered,
   if (const FrameSet* film = plan.film())
     report.film = {film->cameras[0].width, film->cameras[0].height};
   report.strength = settings.style.strength;
-  report.film_renderer = rendered.film_renderer;
   if (rendered.seconds > 0) report.frames_per_second = report.frames / rendered.seconds;
   report.seen_by_few = seen.metrics();
   return report;
@@ -140,8 +137,6 @@ StageOutcome Render(const JsonValue& inputs, RunContext* context,
   } else {
     SceneFrames frames(context, plan, std::move(before), take_styled);
     SayPlan(plan, settings.render, console);
-    if (plan.film() != nullptr)
-      console->Detail("renderer of the film: " + frames.film_renderer());
     RemoveFrames(plan, style);
     rendered = RenderAll(plan, &frames, context, progress, &seen);
   }
@@ -169,7 +164,6 @@ Stage RenderStage(RunContext* context) {
       {"views_2d", context->ResultOf("style_2d")},
       {"strength", context->settings.style.strength},
       {"keep_field", context->settings.style.keep_field},
-      {"exact_film", WantsExactFilm(context->settings)},
       {"options", OptionValues(context->settings.scene, context->settings.render,
                                context->settings.style_2d)}};
   if (!context->settings.render.films.films) stage.inputs["films"] = false;

@@ -5,7 +5,6 @@
 
 #include "pipeline/capture/photo_gains.h"
 #include "pipeline/program/device_choice.h"
-#include "pipeline/stages/film_renderer.h"
 #include "pipeline/stages/styled_field.h"
 #include "pipeline/workspace/output_names.h"
 
@@ -78,7 +77,6 @@ SceneFrames::SceneFrames(RunContext* context, const FramePlan& plan, StoredField
   stylizer_ = MakeSceneStylizer(context, plan.views, masks_.get(),
                                 [this](const Image&, int) { return coverage_; });
   edit_.emplace(settings.residual, plan.views, *source_);
-  why_exact_ = PrepareFilm(settings, plan.film_of_views(), &*source_, &*styled_);
 }
 
 // Fields have gigabytes: neither stays.
@@ -97,9 +95,7 @@ Frame SceneFrames::Render(const FrameSet& set, int index) {
   const Camera& camera = set.cameras[static_cast<size_t>(index)];
   const bool in_film_alone = set.prefix == kFilmPrefix;
   const double begin = context_->console->StageSeconds();
-  RenderedPair pair = in_film_alone && why_exact_.empty()
-                          ? source_->RenderFastWith(*styled_, camera)
-                          : source_->RenderWith(*styled_, camera);
+  RenderedPair pair = source_->RenderWith(*styled_, camera);
   seconds_ += context_->console->StageSeconds() - begin;
   Frame frame;
   frame.styled = std::move(pair.other_color);
@@ -132,9 +128,5 @@ void SceneFrames::AddViews2d(const Camera& camera, int index, Frame* frame) {
 }
 
 std::string SceneFrames::device() const { return DeviceName(backend_); }
-
-std::string SceneFrames::film_renderer() const {
-  return plan_.film() == nullptr ? "" : FilmRendererText(why_exact_, *source_);
-}
 
 }  // namespace regrade

@@ -50,8 +50,6 @@ class SceneFrames {
 
   double seconds() const { return seconds_; }  // of rendering both fields
   std::string device() const;
-  // FilmRendererText; empty without a film.
-  std::string film_renderer() const;
 
  private:
   void Prepare(StoredField before, const std::function<void(StoredField)>& take_styled);
@@ -66,7 +64,6 @@ class SceneFrames {
   std::vector<Image> coverage_;               // of the current frame
   std::unique_ptr<ViewStylizer> stylizer_;
   std::optional<CarriedEdit> edit_;  // what single photos have beyond the 2D method
-  std::string why_exact_;            // the film is; empty: both renderers are prepared for it
   double seconds_ = 0;
 };
 

@@ -93,7 +93,6 @@ class Fitter {
     const int num_stages = static_cast<int>(options_.steps.size());
     while (stage_ < num_stages) {
       RunStage();
-      if (stage_ + 1 < num_stages) Measure();
       if (++stage_ == num_stages) break;
       Refine(false);
       step_ = 0;
@@ -104,12 +103,9 @@ class Fitter {
     if (options_.prune_last) Refine(true);
     result_.seconds = SecondsSince(start_) - idle_seconds_;
     result_.voxels = engine_->num_voxels();
-    Measure();
-    if (hooks_.keep_field) {
-      engine_->ReadState(
-          [this](FitState* state) { result_.field = ToRadianceField(state->grid); });
-      result_.field.march = MarchOfField(options_);
-    }
+    engine_->ReadState(
+        [this](FitState* state) { result_.field = ToRadianceField(state->grid); });
+    result_.field.march = MarchOfField(options_);
     result_.psnr_train_db = PsnrOf(tally_.tail_error, tally_.tail_rays);
     result_.rays = tally_.rays;
     result_.samples = tally_.samples;
@@ -286,12 +282,6 @@ class Fitter {
     }
     idle_seconds_ += SecondsSince(begin);
     last_checkpoint_ = Clock::now();
-  }
-
-  void Measure() {
-    const Clock::time_point begin = Clock::now();
-    if (hooks_.measure) hooks_.measure(engine_.get());
-    idle_seconds_ += SecondsSince(begin);
   }
 
   static constexpr int kWindow = 20;  // steps

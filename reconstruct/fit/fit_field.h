@@ -57,9 +57,6 @@ class FitEngine;
 
 struct FitHooks {
   ProgressFunction progress;
-  // Called at the end of each stage and of the fit, while the field is still on its device.
-  std::function<void(FitEngine*)> measure;
-  bool keep_field = true;      // false: FitResult::field stays empty
   FitState* resume = nullptr;  // moved from
   // Called at stage ends, about once a minute, and before an abort.
   std::function<void(const FitState&)> checkpoint;

@@ -4,7 +4,7 @@
 
 #include "kernels/base/error.h"
 #include "kernels/image/color_statistics.h"
-#include "stylize/image/distribution_transfer.h"
+#include "stylize/image/sample_colors.h"
 #include "stylize/image/map_stylizer.h"
 #include "stylize/image/mixture_transport.h"
 #include "stylize/image/monge_kantorovich.h"

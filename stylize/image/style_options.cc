@@ -11,9 +11,7 @@ struct NamedKind {
 };
 constexpr NamedKind kColorMethods[] = {{"mkl", StyleMethodKind::kMkl},
                                        {"gmm", StyleMethodKind::kGmm},
-                                       {"reinhard", StyleMethodKind::kReinhard},
-                                       {"idt", StyleMethodKind::kIdt},
-                                       {"histogram", StyleMethodKind::kHistogram}};
+                                       {"reinhard", StyleMethodKind::kReinhard}};
 constexpr NamedKind kNetworks[] = {{"pca-kd", StyleMethodKind::kNetwork}};
 constexpr NamedKind kMethodsWithArgument[] = {{"onnx", StyleMethodKind::kOnnx},
                                               {"folder", StyleMethodKind::kFolder},
@@ -24,10 +22,6 @@ constexpr NamedKind kMethodsWithArgument[] = {{"onnx", StyleMethodKind::kOnnx},
 StyleMethod ParseStyleMethod(const StyleOptions& options) {
   const std::string& text = options.method;
   const std::string hint = std::string("use ") + kStyleMethods;
-  if (options.regrain && text != "idt" && text != "histogram")
-    throw UsageError(
-        "\"" + text + "\" does not amplify grain", "--method and --style-regrain",
-        "leave it out, or add --no-style-regrain where an earlier run asked for it");
   for (const auto& [name, kind] : kColorMethods)
     if (text == name) return {kind, name, ""};
   const auto refuse_scene_wide = [&](const std::string& name) {

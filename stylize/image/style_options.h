@@ -9,8 +9,7 @@ namespace regrade {
 
 // For hints; --method has no `choices`, because three of its values continue after a colon.
 inline constexpr char kStyleMethods[] =
-    "mkl, gmm, reinhard, idt, histogram, pca-kd, onnx:DIR, folder:DIR or command:\"PROGRAM "
-    "...\"";
+    "mkl, gmm, reinhard, pca-kd, onnx:DIR, folder:DIR or command:\"PROGRAM ...\"";
 
 struct StyleOptions {
   std::string method = "mkl";
@@ -18,8 +17,6 @@ struct StyleOptions {
   int parts = 6;
   double max_slope = 4;
   double height_weight = 0;
-  int iterations = 20;
-  bool regrain = false;
   int max_side = 1024;
   double command_limit_s = 600;
 
@@ -28,17 +25,17 @@ struct StyleOptions {
     bind("method", method,
          {.help =
               "2D method that styles each view: mkl (mean and covariance of the colours), gmm "
-              "(the same for groups of colours), reinhard, idt (whole distribution; amplifies "
-              "grain), histogram, pca-kd (networks of 302 kB, fetched once after a yes), "
-              "onnx:DIR, folder:DIR (photos that another program styled), command:\"PROGRAM "
-              "{input} {style} {output}\" (run for each view); see stylize/README.md",
+              "(the same for groups of colours), reinhard, pca-kd (networks of 302 kB, "
+              "fetched once after a yes), onnx:DIR, folder:DIR (photos that another program "
+              "styled), command:\"PROGRAM {input} {style} {output}\" (run for each view); see "
+              "stylize/README.md",
           .runs = "command:|onnx:",
           .reads = "folder:"});
     bind("scene-wide", scene_wide,
          {.help =
               "estimates one colour map from all views, instead of one for each view: frames "
               "are more consistent with each other, but a single view's colours are further "
-              "from the style's; with mkl, gmm, reinhard, idt and histogram"});
+              "from the style's; with mkl, gmm and reinhard"});
     bind("style-parts", parts,
          {.help = "groups of colours of method gmm, fewer where a picture has fewer",
           .min = 1,
@@ -57,15 +54,6 @@ struct StyleOptions {
                   "looks at colours alone",
           .min = 0,
           .max = 10});
-    bind("style-iterations", iterations,
-         {.help = "rotations of method idt; its time grows with them",
-          .min = 1,
-          .max = 200,
-          .constant = true});
-    bind("style-regrain", regrain,
-         {.help = "with idt and histogram: restores the photo's grain and edges, which the "
-                  "transfer amplifies; takes about a second for a view of a megapixel, and "
-                  "reduces the style's contrast a little"});
     bind("style-max-side", max_side,
          {.unit = "pixels",
           .help = "longer side at which networks see a picture; memory and time grow "
@@ -86,8 +74,6 @@ enum class StyleMethodKind {
   kMkl,
   kGmm,
   kReinhard,
-  kIdt,
-  kHistogram,
   kNetwork,  // fetched by the program
   kOnnx,
   kFolder,

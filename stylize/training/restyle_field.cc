@@ -16,10 +16,6 @@ constexpr double kAfterTraining = 0.15;
 
 RestyledField Restyle(RadianceField field, const TrainingTargets& targets,
                       const RestyleRequest& request, const RestyleHooks& hooks) {
-  using Part = RestyleHooks::Part;
-  const auto finished = [&](Part part) {
-    if (hooks.finished) hooks.finished(part);
-  };
   RestyledField result;
   const SceneColorMap scene_map = targets.SceneMap(&result.notices);
   field.appearance = PadShBasis(std::move(field.appearance), kStyledBasis);
@@ -30,13 +26,11 @@ RestyledField Restyle(RadianceField field, const TrainingTargets& targets,
 
   const std::unique_ptr<StyleEngine> engine =
       MakeStyleEngine(request.backend, &field, request.options);
-  finished(Part::kUpload);
   ProgressParts parts(hooks.training.progress, 1 + kAfterTraining);
   TrainingHooks training = hooks.training;
   training.progress = parts.Next(1);
   result.trained = TrainNetwork(field, targets.views(), scene_map, request.options, training,
                                 request.resume, engine.get());
-  finished(Part::kTraining);
   Appearance restyled = engine->Restyle(result.trained.network, parts.Next(kAfterTraining));
   result.styled = {field.geometry, std::move(restyled), field.background, field.near_clip,
                    field.march};
@@ -44,7 +38,6 @@ RestyledField Restyle(RadianceField field, const TrainingTargets& targets,
   result.source.background = source_background;
   if (request.object_weights != nullptr)
     result.styled = MixFields(result.source, {&result.styled}, {1}, request.object_weights);
-  finished(Part::kApplication);
   if (hooks.check) {
     engine->weigher()->min_weight = 0;
     hooks.check(result, engine->weigher());

@@ -36,9 +36,6 @@ struct RestyledField {
 
 struct RestyleHooks {
   TrainingHooks training;  // its progress is that of all parts
-  // Called when the field is where it is trained, after training, and at the end.
-  enum class Part { kUpload, kTraining, kApplication };
-  std::function<void(Part)> finished;
   // Called at the end with a weigher of the field, of min_weight 0, which knows the views.
   std::function<void(const RestyledField&, RayWeigher*)> check;
 };

@@ -240,8 +240,6 @@ TrainNetworkResult Training::Conclude() {
   result_.history = std::move(state_.history);
   result_.history.steps.push_back(state_.step);
   result_.history.bounds.push_back(result_.bound);
-  result_.mean_touched_voxels =
-      steps_here_ > 0 ? touched_ / static_cast<double>(steps_here_) : 0;
   result_.rejected_steps = state_.adam.rejected;
   result_.left_out_pixels = state_.left_out_pixels;
   result_.network = std::move(network_);

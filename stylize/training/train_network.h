@@ -70,7 +70,6 @@ struct TrainNetworkResult {
   double largest_norm_drift = 0;   // of the power iteration, during training
   double psnr_db = 0;              // of a fixed sample of training rays to the targets, clipped
   double linear_map_psnr_db = 0;   // the same of linear_map; 0 without a base map
-  double mean_touched_voxels = 0;
   // 3 Q / B of a step, rays and channels over what the network maps: the weight that LipRF's
   // sum over voxels gives the colours against the regularisation, beside a mean over rays.
   // Empty if this call made no step.

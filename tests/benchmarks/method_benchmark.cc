@@ -2,7 +2,7 @@
 //
 //   method_benchmark METHOD[,METHOD...] STYLE.jpg[,STYLE.jpg...] SIDE SHEET.png FOLDER...
 //
-// METHOD is as of --method: mkl, gmm, reinhard, idt, histogram or onnx:DIR; gmm+height is gmm
+// METHOD is as of --method: mkl, gmm, reinhard or onnx:DIR; gmm+height is gmm
 // with --height-weight 1. Pictures are brought to SIDE pixels. SHEET.png shows one picture of
 // each folder in each style, by each method; "-" writes none. Prints a Markdown table; a row is
 // a mean over folders and styles, the worst in brackets: the distance of the styled pictures'
@@ -26,7 +26,7 @@
 #include "pipeline/images/contact_sheet.h"
 #include "pipeline/images/image_file.h"
 #include "stylize/image/color_transfer.h"
-#include "stylize/image/distribution_transfer.h"
+#include "stylize/image/sample_colors.h"
 #include "stylize/image/gaussian_mixture.h"
 #include "stylize/image/mixture_transfer.h"
 #include "stylize/image/onnx_stylizer.h"
@@ -58,10 +58,6 @@ std::unique_ptr<ViewStylizer> Make(const StyleOptions& options, const Image& sty
   if (kind == StyleMethodKind::kGmm) {
     const std::vector<Vec3d> scene = sample(kMixtureSample);
     return MakeMixtureTransfer(options, style, scene, heights);
-  }
-  if (kind == StyleMethodKind::kIdt || kind == StyleMethodKind::kHistogram) {
-    const std::vector<Vec3d> scene = sample(4 * kColorSample);
-    return MakeDistributionTransfer(options, style, options.scene_wide ? &scene : nullptr);
   }
   std::vector<ColorStatistics> parts;
   for (const Image& photo : photos) parts.push_back(MeasureForMethod(options, photo));

@@ -1,11 +1,10 @@
-// Fuzz targets: field.npz and packed captures; accepted fields are rendered.
+// Fuzz targets: field.npz; accepted fields are rendered.
 #include <cmath>
 #include <cstring>
 #include <optional>
 
 #include "kernels/field/cpu/render_view.h"
 #include "kernels/field/render.h"
-#include "pipeline/capture/packed_capture.h"
 #include "pipeline/fields/field_file.h"
 #include "pipeline/files/npz_file.h"
 #include "tests/fuzz/fuzz_support.h"
@@ -78,39 +77,10 @@ std::string MutateField(std::string bytes, FuzzRandom* random) {
   return MutateNpz(BuildStoredZip(*parts), random);
 }
 
-std::vector<std::string> PackedSeeds() {
-  PackedCapture capture;
-  capture.scene.ndc = {1.5, 2};
-  for (int i = 0; i < 2; ++i) {
-    PackedView view;
-    view.file = "photo " + std::to_string(i) + ".jpg";
-    view.held_out = i == 1;
-    view.camera.width = 6 + i, view.camera.height = 5;
-    view.camera.fx = view.camera.fy = 7, view.camera.cx = 3, view.camera.cy = 2.5;
-    view.photo = Image(6 + i, 5, 3);
-    capture.views.push_back(view);
-  }
-  const std::string path = FuzzFolder() + "/seed_packed.npz";
-  WritePackedCapture(path, capture);
-  return {StoredCopyOfNpz(path)};
-}
-
-bool ReadPacked(std::string_view bytes) {
-  const std::string path = FuzzFile("packed.npz", bytes);
-  return Accepts([&path] {
-    for (const PackedView& view : ReadPackedCapture(path).views)
-      FuzzRequire(view.camera.width == view.photo.width &&
-                      view.camera.height == view.photo.height && view.camera.fx > 0 &&
-                      std::isfinite(view.camera.camera_from_world.translation.x),
-                  "a view's camera is that of its photo");
-  });
-}
-
 }  // namespace
 
 std::vector<FuzzTarget> FieldTargets() {
-  return {{"field_npz", FieldSeeds, ReadField, MutateField, 5000},
-          {"packed_npz", PackedSeeds, ReadPacked, MutateNpz, 10000}};
+  return {{"field_npz", FieldSeeds, ReadField, MutateField, 5000}};
 }
 
 }  // namespace regrade::testing

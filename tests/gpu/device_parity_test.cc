@@ -68,21 +68,6 @@ TEST_P(DeviceParity, Render) {
           std::max(against_float, std::abs(double{transmittances[r]} - plain.transmittance));
       depth_error = std::max(depth_error, std::abs(double{depths[r]} - plain.depth));
     }
-    // Colours with opacity steps: within a step of the exact ones; the colours of these fields
-    // are in [-1, 2].
-    constexpr float kOpacityStep = 1.0f / 64;
-    RenderOnDevice(grid, on_device.data(), rays.size(), options,
-                   {color.data(), depth.data(), transmittance.data()}, kOpacityStep);
-    const Buffer<Vec3f> stepped = color.ToHost();
-    const Buffer<float> stepped_transmittances = transmittance.ToHost();
-    double step_error = 0;
-    for (int64_t r = 0; r < rays.size(); ++r) {
-      ASSERT_EQ(stepped_transmittances[r], transmittances[r]);
-      for (int c = 0; c < 3; ++c)
-        step_error =
-            std::max(step_error, std::abs(double{stepped[r][c]} - double{colors[r][c]}));
-    }
-    Row("render in opacity steps", basis(), "every sample", step_error, 3 * kOpacityStep);
     Row("render", basis(), "plain float", against_float, 2e-5);
     Row("render", basis(), "plain double", against_double,
         1e-4);  // one sample more or less at the stop
@@ -102,25 +87,19 @@ Camera SmallCamera(bool ndc) {
   return camera;
 }
 
-// Frames equal the plain ray's pixels; in half precision the error stays below half a step of
-// an 8-bit picture: values up to 1 are rounded by 2^-12, and a colour depends on nine of them
-// and the density.
+// Frames equal the plain ray's pixels.
 TEST_P(DeviceParity, Frame) {
   const RadianceField field = RandomField({33, 27, 41}, basis(), 0.5, 31);
   const DeviceGrid grid = UploadGrid(MakeFastGrid(field));
-  const HalfGrid half = MakeHalfGrid(grid);
-  ASSERT_EQ(half.empty(), basis() != 9);
   for (const bool ndc : {false, true}) {
     const Camera camera = SmallCamera(ndc);
     const MarchOptions options{0.5f, 1e-4f};
     const RenderedView plain = RenderViewPlain(field, camera, options);
-    double error = 0, depth_error = 0, half_error = 0, seen = 0;
+    double error = 0, depth_error = 0, seen = 0;
     const RenderedView view = RenderViewOnDevice(grid, camera, options);
-    const RenderedView halved = RenderViewOnDevice(grid, camera, options, {.half = &half});
     for (size_t i = 0; i < plain.color.pixels.size(); ++i) {
       const double value = plain.color.pixels[i];
       error = std::max(error, std::abs(double{view.color.pixels[i]} - value));
-      half_error = std::max(half_error, std::abs(double{halved.color.pixels[i]} - value));
     }
     for (size_t i = 0; i < plain.depth.pixels.size(); ++i) {
       seen += plain.depth.pixels[i] > 0;
@@ -133,8 +112,6 @@ TEST_P(DeviceParity, Frame) {
     Row("frame", basis(), ndc ? "plain float, NDC" : "plain float", error, 2e-5);
     Row("depth of a frame", basis(), ndc ? "plain float, NDC" : "plain float", depth_error,
         1e-3);
-    Row("frame in half precision", basis(), ndc ? "plain float, NDC" : "plain float",
-        half_error, 0.5 / 255);
   }
 }
 

@@ -100,7 +100,6 @@ TEST_P(DeviceSpheresParity, Render) {
 TEST_P(DeviceSpheresParity, Frame) {
   const RadianceField field = WithLayers(basis(), 0.3);
   const DeviceGrid grid = UploadGrid(MakeFastGrid(field));
-  const HalfGrid half = MakeHalfGrid(grid);
   Camera camera;
   camera.width = 37;
   camera.height = 29;
@@ -111,14 +110,12 @@ TEST_P(DeviceSpheresParity, Frame) {
   const MarchOptions options{0.5f, 1e-4f};
   const RenderedView plain = RenderViewPlain(field, camera, options);
   const RenderedView view = RenderViewOnDevice(grid, camera, options);
-  const RenderedView halved = RenderViewOnDevice(grid, camera, options, {.half = &half});
   camera.lens = LensModel::kOpenCv;  // without distortion, but rays come from the host
   const RenderedView listed = RenderViewOnDevice(grid, camera, options);
-  double error = 0, half_error = 0, listed_error = 0, depth_error = 0;
+  double error = 0, listed_error = 0, depth_error = 0;
   for (size_t i = 0; i < plain.color.pixels.size(); ++i) {
     const double value = plain.color.pixels[i];
     error = std::max(error, std::abs(double{view.color.pixels[i]} - value));
-    half_error = std::max(half_error, std::abs(double{halved.color.pixels[i]} - value));
     listed_error = std::max(listed_error, std::abs(double{listed.color.pixels[i]} - value));
   }
   for (size_t i = 0; i < plain.depth.pixels.size(); ++i)
@@ -128,7 +125,6 @@ TEST_P(DeviceSpheresParity, Frame) {
   Row("frame before layers", "plain float", error, 2e-5);
   Row("frame before layers, rays of a list", "plain float", listed_error, 2e-5);
   Row("depth of a frame before layers", "plain float", depth_error, 1e-3);
-  Row("frame before layers in half precision", "plain float", half_error, 0.5 / 255);
 }
 
 // Loss and gradients of a batch of rays.

@@ -62,7 +62,7 @@ TEST(Looks, ALutIsAStyleAndAStyleALut) {
     EXPECT_NE(end.code, 0);
     EXPECT_NE(end.text.find(says), std::string::npos) << end.text;
   };
-  refused({"--style", folder / "warm.cube", "--method", "idt"}, "a LUT is its own method");
+  refused({"--style", folder / "warm.cube", "--method", "gmm"}, "a LUT is its own method");
   WriteText(folder / "preset.xmp", "<x:xmpmeta/>");
   refused({"--style", folder / "preset.xmp"}, "is a look of another program");
   WriteText(folder / "bad.cube", "LUT_3D_SIZE 2\n0 0 0\n0 0\n");

@@ -107,7 +107,6 @@ RunReport FullReport() {
                                       .path_photo_distance = 1.4,
                                       .film = {640, 480},
                                       .strength = 1,
-                                      .film_renderer = "exact",
                                       .frames_per_second = 12,
                                       .seen_by_few = {0.41, 0.72, 12, {0.5, 0.25}}};
   report.stages.evaluate =
@@ -148,7 +147,7 @@ TEST(ReportJson, HasTheKeysOfSchema2InOrder) {
   EXPECT_EQ(KeysOf(stages.At("render")),
             (Keys{"seconds", "device", "frames", "path_frames", "film_frames", "film_seconds",
                   "path_transmittance", "path_photo_distance", "film", "strength",
-                  "film_renderer", "frames_per_second", "seen_by_few"}));
+                  "frames_per_second", "seen_by_few"}));
   EXPECT_EQ(KeysOf(stages.At("render").At("seen_by_few")),
             (Keys{"film", "worst_frame", "worst_frame_number", "photos"}));
   EXPECT_EQ(KeysOf(stages.At("evaluate")),

@@ -260,14 +260,12 @@ TEST(ReportHtml, RowsOfStagesComeFromLabels) {
   report.stages.reconstruct->voxels = 2234881;
   report.stages.render = RenderReport{.frames = 48,
                                       .film = {640, 480},
-                                      .film_renderer = "exact (--exact)",
                                       .frames_per_second = 0.9,
                                       .seen_by_few = {0.414, 0.72, 12, {}}};
   const std::string html = ReportHtml(report, {});
   for (const char* part :
        {"voxels <b>2,234,881</b>", "PSNR, training <b>28.25&nbsp;dB</b>", "frames <b>48</b>",
-        "film <b>640 × 480&nbsp;px</b>", "renderer of the film <b>exact (--exact)</b>",
-        "speed <b>0.90&nbsp;frames/s</b>",
+        "film <b>640 × 480&nbsp;px</b>", "speed <b>0.90&nbsp;frames/s</b>",
         "seen by fewer than three photos: 41 % of the film (72 % of frame 12)"})
     EXPECT_NE(html.find(part), std::string::npos) << part;
   EXPECT_EQ(html.find("finest"), std::string::npos);  // it has no label

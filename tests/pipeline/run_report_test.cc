@@ -6,7 +6,6 @@
 #include <set>
 
 #include "kernels/render/field_renderer.h"
-#include "kernels/render/voxel_renderer.h"
 #include "pipeline/files/json_file.h"
 #include "pipeline/images/image_file.h"
 #include "tests/support/source_dir.h"
@@ -209,21 +208,6 @@ TEST(RunReport, ShowsEveryPartOfTheRun) {
       Regrade({"evaluate", folder / "e", "--gaps", "2", "--control-field"});
   ASSERT_EQ(again_bounded.code, 0) << again_bounded.text;
   EXPECT_EQ(again_bounded.text.find("fitted to the 2D method's pictures"), std::string::npos);
-
-  // Another choice of the film's renderer renders again, and is named.
-  const auto film_renderer = [&] {
-    return ReadJsonFile(folder / "e/styles/style_sunset/report.json")
-        .At("stages")
-        .At("render")
-        .At("film_renderer");
-  };
-  EXPECT_EQ(film_renderer().AsString(), kFastRendererOfCpu);
-  const testing::ProgramOutcome rendered =
-      Regrade({"render", folder / "e", "--exact", "--verbose"});
-  ASSERT_EQ(rendered.code, 0) << rendered.text;
-  EXPECT_NE(rendered.text.find("renderer of the film: exact (--exact)"), std::string::npos)
-      << rendered.text;
-  EXPECT_EQ(film_renderer().AsString(), "exact (--exact)");
 }
 
 // H157: a style picture of one colour is reported on the terminal, in report.json and on the

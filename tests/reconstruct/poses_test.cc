@@ -1,11 +1,10 @@
-// Poses from photos with a fake colmap that fails in all known ways.
+// Poses from photos with a fake colmap that fails in its ways; how processes end is tested in
+// child_process_test.cc.
 #include <gtest/gtest.h>
-#include <sys/wait.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <cmath>
-#include <csignal>
 #include <filesystem>
 #include <fstream>
 
@@ -13,7 +12,6 @@
 #include "reconstruct/colmap/colmap_model.h"
 #include "reconstruct/colmap/colmap_strategies.h"
 #include "reconstruct/colmap/poses_from_photos.h"
-#include "tests/support/process_state.h"
 #include "tests/support/synthetic_model.h"
 
 namespace regrade {
@@ -221,55 +219,6 @@ TEST_F(Poses, F50_HangEndsAtTheLimits) {
 TEST_F(Poses, F50_TimeLimit) {
   options_.time_limit_min = 2.0 / 60;
   ExpectError("hang", ExitCode::kExternalProgram, {"time limit", "pose-time-limit"});
-}
-
-TEST_F(Poses, F50_IgnoredSigtermIsFollowedBySigkill) {
-  options_.quiet_limit_min = 0.3 / 60;
-  ExpectError("stubborn", ExitCode::kExternalProgram, {"printed nothing"});
-}
-
-TEST_F(Poses, F49_DeathByAnySignalIsNamed) {
-  for (const int number : {SIGHUP, SIGINT, SIGQUIT, SIGILL, SIGTRAP, SIGBUS, SIGFPE, SIGKILL,
-                           SIGSEGV, SIGPIPE, SIGALRM, SIGTERM, SIGXCPU, SIGXFSZ, SIGSYS}) {
-    fs::remove_all(folder_ / "work");
-    ExpectError("signal-" + std::to_string(number), ExitCode::kExternalProgram,
-                {"mapper", "signal " + std::to_string(number), "mapper.log"});
-  }
-}
-
-TEST_F(Poses, F50_AnEndlessFloodThatIgnoresSigtermEnds) {
-  options_.time_limit_min = 1.0 / 60;
-  ExpectError("endless", ExitCode::kExternalProgram, {"time limit"});
-  EXPECT_LT(fs::file_size(folder_ / "work/logs/mapper.log"), 17u << 20);
-}
-
-TEST_F(Poses, F50_GrandchildrenEndWithTheirParent) {
-  EXPECT_EQ(Run("grandchildren").views.size(), 10u);
-  pid_t grandchild = 0;
-  std::ifstream(folder_ / "work/grandchild") >> grandchild;
-  ASSERT_GT(grandchild, 1);
-  EXPECT_TRUE(testing::Ends(grandchild));
-}
-
-TEST_F(Poses, F35_ColmapEndsWithARunThatIsKilled) {
-  const pid_t run = fork();
-  if (run == 0) {
-    Run("family");
-    _exit(0);
-  }
-  const pid_t colmap = testing::NumberIn(folder_ / "work/parent"),
-              child = testing::NumberIn(folder_ / "work/child");
-  ASSERT_GT(colmap, 1);
-  ASSERT_GT(child, 1);
-  kill(run, SIGKILL);
-  waitpid(run, nullptr, 0);
-  EXPECT_TRUE(testing::Ends(colmap));
-  EXPECT_TRUE(testing::Ends(child));
-}
-
-TEST_F(Poses, F52_AFloodBeforeTheModel) {
-  EXPECT_EQ(Run("flood-at-the-end").views.size(), 10u);
-  EXPECT_LT(fs::file_size(folder_ / "work/logs/mapper.log"), 17u << 20);
 }
 
 TEST_F(Poses, F50_AModelWrittenBeforeTheLimitIsUsed) {

@@ -11,7 +11,7 @@
 #include "kernels/base/random.h"
 #include "kernels/image/color_statistics.h"
 #include "kernels/image/color_table.h"
-#include "stylize/image/distribution_transfer.h"
+#include "stylize/image/sample_colors.h"
 #include "stylize/image/mixture_transfer.h"
 #include "stylize/image/monge_kantorovich.h"
 #include "stylize/image/transport_plan.h"
@@ -215,7 +215,7 @@ TEST(MixtureTransport, AViewKeepsTheScenesHeights) {
   MeasureHeights(colors, heights, &scene);
   // A camera that looks up sees the sky alone; its sky is as high as in all photos.
   const GaussianMixture view =
-      AdaptMixture(scene, SampleColors(Groups(9, {{1, {0.4, 0.5, 0.8}, 0.03}}), ""));
+      AdaptMixture(scene, SampleColors(Groups(9, {{1, {0.4, 0.5, 0.8}, 0.03}}), "", 1 << 16));
   ASSERT_EQ(view.size(), 2u);
   for (size_t k = 0; k < 2; ++k) {
     EXPECT_NEAR(scene[k].height, scene[k].mean.z > 0.5 ? 0.75 : 0.25, 0.01);
@@ -271,7 +271,7 @@ TEST(MixtureTransport, H183_FewerColoursThanParts) {
     for (int c = 0; c < 3; ++c)  // with noise of a fifth of a step of 8 bits
       two.pixels[3 * i + c] = static_cast<float>((i % 4 == 0 ? 0.2 : 0.8) +
                                                  (RandomDouble(5, c, i) - 0.5) * 0.2 / 255);
-  const GaussianMixture mixture = FitMixture(SampleColors(two, ""), 16, 1);
+  const GaussianMixture mixture = FitMixture(SampleColors(two, "", kMixtureSample), 16, 1);
   ASSERT_EQ(mixture.size(), 2u);
   for (const GaussianPart& part : mixture) {
     EXPECT_NEAR(part.weight, part.mean.x < 0.5 ? 0.25 : 0.75, 1e-12);

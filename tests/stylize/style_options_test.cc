@@ -27,7 +27,7 @@ TEST(StyleMethod, UnknownMethodsAreUsageErrorsThatListTheOthers) {
   for (const char* method :
        {"", "wct2", "MKL", "mkl:", "onnx", "onnx:", "folder: ", "command:"})
     EXPECT_REGRADE_ERROR(ParseStyleMethod(Method(method)), ExitCode::kUsage,
-                         "mkl, gmm, reinhard, idt");
+                         "mkl, gmm, reinhard, pca-kd");
   EXPECT_REGRADE_ERROR(ParseStyleMethod(Method("folder:x", true)), ExitCode::kUsage,
                        "--scene-wide");
 }

@@ -115,33 +115,8 @@ void Write(ColmapModel model, const std::vector<std::string>& names,
 
 int Map() {
   if (Is("hang")) HangForEver();
-  if (Is("family")) {  // writes its process id and its child's
-    const std::string work = arguments["output_path"] + "/../../";
-    const pid_t child = fork();
-    if (child > 0) {
-      std::ofstream(work + "child") << child << "\n";
-      std::ofstream(work + "parent") << getpid() << "\n";
-    }
-    HangForEver();
-  }
-  if (Is("stubborn")) {
-    std::signal(SIGTERM, SIG_IGN);
-    HangForEver();
-  }
   if (Is("nothing")) return 0;
   if (Is("crash")) std::abort();
-  if (behaviour.rfind("signal-", 0) == 0) {
-    const int number = std::stoi(behaviour.substr(7));
-    std::signal(number, SIG_DFL);
-    raise(number);
-  }
-  if (Is("flood-at-the-end"))
-    for (int i = 0; i < 300000; ++i) std::printf("%0100d\n", i);
-  if (Is("endless")) {
-    // Prints forever and ignores SIGTERM.
-    std::signal(SIGTERM, SIG_IGN);
-    while (true) std::printf("still working\n");
-  }
   std::vector<std::string> names;
   std::string features;
   std::ifstream database(arguments["database_path"]);
@@ -188,13 +163,6 @@ int Map() {
     options.images = static_cast<int>(names.size());
     Write(testing::MakeSyntheticModel(options), names, out + "/1");
     return 0;
-  }
-  if (Is("grandchildren")) {
-    // Outlives its parent and keeps the pipe open. The parent writes its process id, since it
-    // may be killed before it runs.
-    const pid_t grandchild = fork();
-    if (grandchild == 0) HangForEver();
-    std::ofstream(arguments["output_path"] + "/../../grandchild") << grandchild << "\n";
   }
   Write(testing::MakeSyntheticModel(options), names, out + "/0");
   if (Is("half"))

@@ -4,7 +4,6 @@
 #pragma once
 
 #include "kernels/field/cuda/device_grid.h"
-#include "kernels/field/cuda/half_grid.h"
 #include "kernels/field/density_losses.h"
 #include "kernels/field/ray_march.h"
 #include "kernels/field/render.h"
@@ -18,34 +17,17 @@ struct DeviceRenderTarget {
   float* depth = nullptr;
   float* transmittance = nullptr;
 };
-// EQ(opacity-steps): a ray's colour is the integral of the colour over the accumulated opacity,
-//   C = int_0^{1 - T} c(o) do + T c_bg,   o = 1 - (transmittance along the ray),
-// and the sum over samples is that integral with c constant between them. With opacity_step s >
-// 0 only the samples at which o passes (k + 1/2) s are shaded. Each gets the opacity
-// accumulated since the previous shaded sample, and the sum is scaled to 1 - T: at most 1 / s +
-// 1 colours per ray, and an error of about s times the change of colour within a step; a ray
-// with 1 - T below s / 2 contributes no colour. 0 shades every sample. Depths and
-// transmittances are exact in both cases.
 void RenderOnDevice(const DeviceGrid& grid, const Ray* rays, int64_t n,
-                    const MarchOptions& options, const DeviceRenderTarget& target,
-                    float opacity_step = 0);
-
-// What makes frames faster, and not exact.
-struct FastFrames {
-  float opacity_step = 0;
-  const HalfGrid* half = nullptr;  // replaces colours and densities; null or empty: exact
-};
+                    const MarchOptions& options, const DeviceRenderTarget& target);
 
 // A frame at a camera without distortion: rays are generated and pixels resolved (see
 // ResolvePixel) inside the kernel. `target` [height, width]; does not wait.
 void RenderFrameOnDevice(const DeviceGrid& grid, const Camera& camera,
-                         const MarchOptions& options, const DeviceRenderTarget& target,
-                         const FastFrames& fast = {});
+                         const MarchOptions& options, const DeviceRenderTarget& target);
 
-// A whole view, colours clipped, depths along the optical axis; see render.h. With a lens that
-// distorts, of `fast` only the opacity step counts.
+// A whole view, colours clipped, depths along the optical axis; see render.h.
 RenderedView RenderViewOnDevice(const DeviceGrid& grid, const Camera& camera,
-                                const MarchOptions& options, const FastFrames& fast = {});
+                                const MarchOptions& options);
 
 // Sums over many steps; reading them waits for the device.
 struct DeviceFitSums {

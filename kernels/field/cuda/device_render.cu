@@ -11,7 +11,7 @@
 namespace regrade {
 
 RenderedView RenderViewOnDevice(const DeviceGrid& grid, const Camera& camera,
-                                const MarchOptions& options, const FastFrames& fast) {
+                                const MarchOptions& options) {
   const int64_t n = int64_t{camera.width} * camera.height;
   DeviceBuffer<Vec3f> color(n, "colours of a view");
   DeviceBuffer<float> depth(n, "depths of a view"),
@@ -26,7 +26,7 @@ RenderedView RenderViewOnDevice(const DeviceGrid& grid, const Camera& camera,
     transmittance.CopyOut(view.transmittance.pixels.data(), n);
   };
   if (camera.lens == LensModel::kPinhole) {
-    RenderFrameOnDevice(grid, camera, options, target, fast);
+    RenderFrameOnDevice(grid, camera, options, target);
     take();
     return view;
   }
@@ -37,7 +37,7 @@ RenderedView RenderViewOnDevice(const DeviceGrid& grid, const Camera& camera,
       rays[static_cast<size_t>(y) * camera.width + x] = camera.PixelRay(x, y);
   DeviceBuffer<Ray> device_rays(n, "rays of a view");
   device_rays.CopyIn(rays.data(), n);
-  RenderOnDevice(grid, device_rays.data(), n, options, target, fast.opacity_step);
+  RenderOnDevice(grid, device_rays.data(), n, options, target);
   take();
   FinishView(camera, rays, &view);
   return view;
@@ -50,39 +50,6 @@ namespace {
 constexpr int kWarps = 4;             // per block
 constexpr int kRays = kRenderedRays;  // per block
 constexpr int kPending = 64;          // samples waiting to be shaded; a power of 2
-
-// Selects the samples to shade and their weights; see EQ(opacity-steps).
-class OpacitySteps {
- public:
-  __device__ explicit OpacitySteps(float step) : inverse_(step > 0 ? 1 / step : 0) {}
-
-  // `before` and `after`: transmittances around a compositing lane's sample. Selected lanes get
-  // a weight above 0.
-  __device__ unsigned Choose(bool composites, float before, float after, int lane,
-                             float* weight) {
-    const bool chosen = composites && (inverse_ == 0 || Steps(after) > Steps(before));
-    const unsigned all = __ballot_sync(kAllLanes, chosen);
-    const unsigned earlier = all & ((1u << lane) - 1);
-    const float last_of_batch =
-        __shfl_sync(kAllLanes, after, earlier == 0 ? 0 : 31 - __clz(earlier));
-    *weight = chosen ? (earlier == 0 ? shaded_ : last_of_batch) - after : 0.0f;
-    if (all != 0) shaded_ = __shfl_sync(kAllLanes, after, 31 - __clz(all));
-    return all;
-  }
-  // Normalises the sum of the weights to 1 - transmittance at the ray's end.
-  __device__ float Scale(float transmittance) const {
-    return shaded_ < 1 ? (1 - transmittance) / (1 - shaded_) : 1.0f;
-  }
-
- private:
-  // 2^23 + round((1 - transmittance) / step); see LocateCellIn.
-  __device__ float Steps(float transmittance) const {
-    return __fadd_rd((1 - transmittance) * inverse_ + 0.5f, 8388608.0f);
-  }
-
-  float inverse_;
-  float shaded_ = 1;  // transmittance after the last selected sample
-};
 
 // A ray prepared by one thread of the block for a warp.
 struct PreparedRay {
@@ -102,21 +69,19 @@ struct PendingSamples {
   float weight[kPending];
 };
 
-template <typename Shader, typename View>
-__device__ RaySums MarchRay(const View& grid, const PreparedRay& prepared,
-                            const MarchOptions& options, float opacity_step,
-                            PendingSamples* pending) {
-  constexpr int kSamples = 32 / Shader::kGroup;
+template <int kBasis>
+__device__ RaySums MarchRay(const DeviceGridView& grid, const PreparedRay& prepared,
+                            const MarchOptions& options, PendingSamples* pending) {
+  constexpr int kSamples = 32 / RayShader<kBasis>::kGroup;
   const int lane = static_cast<int>(threadIdx.x & 31);
-  Shader shader(grid, prepared.basis, lane);
-  WarpMarch<typename Shader::Sampler> march(shader.sampler(), prepared.ray, options);
+  RayShader<kBasis> shader(grid, prepared.basis, lane);
+  WarpMarch<GridSampler> march(GridSampler(grid), prepared.ray, options);
   LaneSample sample;
   unsigned composited;
   float depth = 0;
-  OpacitySteps steps(opacity_step);
   int arrived = 0, shaded = 0;
   const auto shade = [&] {
-    const int mine = shaded + lane / Shader::kGroup;
+    const int mine = shaded + lane / RayShader<kBasis>::kGroup;
     const bool valid = mine < arrived;
     const float4 at = pending->place[mine % kPending];
     shader.Add(valid ? __float_as_int(at.x) : 0, {at.y, at.z, at.w}, valid,
@@ -124,18 +89,16 @@ __device__ RaySums MarchRay(const View& grid, const PreparedRay& prepared,
     shaded += kSamples;
   };
   while (march.Next(&sample, &composited)) {
-    const float alpha = sample.tau > 0 ? Shader::Sampler::Alpha(sample.tau) : 0.0f;
+    const float alpha = sample.tau > 0 ? GridSampler::Alpha(sample.tau) : 0.0f;
     const float w = sample.transmittance_before * alpha;
     depth += w * sample.t;
-    float seen;
-    const unsigned chosen = steps.Choose(sample.tau > 0, sample.transmittance_before,
-                                         sample.transmittance_before - w, lane, &seen);
+    const unsigned chosen = __ballot_sync(kAllLanes, sample.tau > 0);
     if (chosen == 0) continue;
-    if (chosen >> lane & 1) {
+    if (sample.tau > 0) {
       const int at = (arrived + __popc(chosen & ((1u << lane) - 1))) % kPending;
       const Vec3f& f = sample.cell.fraction;
       pending->place[at] = {__int_as_float(sample.cell.vertex), f.x, f.y, f.z};
-      pending->weight[at] = opacity_step > 0 ? seen : w;
+      pending->weight[at] = w;
     }
     arrived += __popc(chosen);
     __syncwarp();  // written by some lanes, read by others
@@ -145,14 +108,13 @@ __device__ RaySums MarchRay(const View& grid, const PreparedRay& prepared,
   if (arrived > shaded) shade();
   __syncwarp();
   const float transmittance = expf(-march.optical_depth());
-  const float scale = opacity_step > 0 ? steps.Scale(transmittance) : 1.0f;
-  return {shader.Sum() * scale + grid.background * transmittance,
+  return {shader.Sum() + grid.background * transmittance,
           WarpSum(depth) * march.world_per_voxel(), transmittance};
 }
 
-template <typename Shader, int kBasis, typename View, typename Rays>
+template <int kBasis, typename Rays>
 __global__ void __launch_bounds__(32 * kWarps, 5)
-    RenderRaysKernel(View grid, Rays rays, MarchOptions options, float opacity_step,
+    RenderRaysKernel(DeviceGridView grid, Rays rays, MarchOptions options,
                      DeviceRenderTarget target, bool resolve) {
   __shared__ PreparedRay prepared[kRays];
   __shared__ RaySums sums[kRays];
@@ -171,8 +133,7 @@ __global__ void __launch_bounds__(32 * kWarps, 5)
   }
   __syncthreads();
   for (int i = warp; i < kRays; i += kWarps) {
-    const RaySums result =
-        MarchRay<Shader>(grid, prepared[i], options, opacity_step, &pending[warp]);
+    const RaySums result = MarchRay<kBasis>(grid, prepared[i], options, &pending[warp]);
     if (thread % 32 == 0) sums[i] = result;
   }
   __syncthreads();
@@ -185,30 +146,18 @@ __global__ void __launch_bounds__(32 * kWarps, 5)
 }
 
 template <typename Rays>
-void RenderBlocks(const DeviceGrid& grid, const HalfGrid* half, const Rays& rays,
-                  const MarchOptions& options, float opacity_step,
+void RenderBlocks(const DeviceGrid& grid, const Rays& rays, const MarchOptions& options,
                   const DeviceRenderTarget& target) {
   const auto blocks = static_cast<unsigned>(rays.Blocks());
   if (blocks == 0) return;
   const bool resolve = !grid.spheres.on();
-  const auto render = [&](auto view, auto launch) {
+  ByBasis(grid.basis, [&](auto basis) {
+    DeviceGridView view = grid.view();
     if (!resolve) view.background = {};  // the layers are composited before it
-    launch(view);
+    RenderRaysKernel<basis.value>
+        <<<blocks, 32 * kWarps>>>(view, rays, options, target, resolve);
     CheckLaunch("render_rays");
-  };
-  if (half != nullptr && !half->empty()) {
-    render(half->view(grid), [&](const HalfGridView& view) {
-      RenderRaysKernel<HalfShader, 9>
-          <<<blocks, 32 * kWarps>>>(view, rays, options, opacity_step, target, resolve);
-    });
-  } else {
-    ByBasis(grid.basis, [&](auto basis) {
-      render(grid.view(), [&](const DeviceGridView& view) {
-        RenderRaysKernel<FloatShader<basis.value>, basis.value>
-            <<<blocks, 32 * kWarps>>>(view, rays, options, opacity_step, target, resolve);
-      });
-    });
-  }
+  });
   if (resolve) return;
   RenderSpheresKernel<<<BlocksFor(int64_t{32} * kRays * blocks), kThreads>>>(
       grid.view(), rays, options.stop_transmittance, target);
@@ -218,28 +167,25 @@ void RenderBlocks(const DeviceGrid& grid, const HalfGrid* half, const Rays& rays
 }  // namespace
 
 void RenderOnDevice(const DeviceGrid& grid, const Ray* rays, int64_t n,
-                    const MarchOptions& options, const DeviceRenderTarget& target,
-                    float opacity_step) {
-  RenderBlocks(grid, nullptr, ListedRays{rays, n}, options, opacity_step, target);
+                    const MarchOptions& options, const DeviceRenderTarget& target) {
+  RenderBlocks(grid, ListedRays{rays, n}, options, target);
 }
 
 void RenderFrameOnDevice(const DeviceGrid& grid, const Camera& camera,
-                         const MarchOptions& options, const DeviceRenderTarget& target,
-                         const FastFrames& fast) {
+                         const MarchOptions& options, const DeviceRenderTarget& target) {
   REGRADE_CHECK(camera.lens == LensModel::kPinhole);
   const DeviceRange range("frame");
-  RenderBlocks(grid, fast.half, FrameRays{PinholeRays(camera), ResolvePixel(camera)}, options,
-               fast.opacity_step, target);
+  RenderBlocks(grid, FrameRays{PinholeRays(camera), ResolvePixel(camera)}, options, target);
 }
 
 #else
 
 void RenderOnDevice(const DeviceGrid&, const Ray*, int64_t, const MarchOptions&,
-                    const DeviceRenderTarget&, float) {
+                    const DeviceRenderTarget&) {
   DeviceWait("render_rays");
 }
 void RenderFrameOnDevice(const DeviceGrid&, const Camera&, const MarchOptions&,
-                         const DeviceRenderTarget&, const FastFrames&) {
+                         const DeviceRenderTarget&) {
   DeviceWait("render_rays");
 }
 
