@@ -8,7 +8,7 @@
 namespace regrade {
 namespace {
 
-constexpr const char* kNames[] = {"ndc",      "alpha",         "background",
+constexpr const char* kNames[] = {"ndc",      "alpha",         "background",   "falloff",
                                   "exposure", kViewDependence, kPoseRefinement};
 
 }  // namespace

@@ -16,6 +16,24 @@ constexpr double kNearlyClipped = 0.98;  // encoded
 
 JsonValue Triple(const Vec3d& v) { return JsonValue::Array{v.x, v.y, v.z}; }
 
+// What a pixel's light was multiplied by, in each channel.
+class GainOfPixel {
+ public:
+  GainOfPixel(const PhotoGain& gain, const Image& picture) : gain_(gain), picture_(picture) {}
+
+  Vec3d operator()(int64_t pixel) const {
+    if (gain_.falloff == LensFalloff{}) return gain_.light;
+    const auto x = static_cast<double>(pixel % picture_.width),
+               y = static_cast<double>(pixel / picture_.width);
+    const double r2 = Radius2(picture_.width, picture_.height, x + 0.5, y + 0.5);
+    return gain_.light * std::exp(gain_.falloff.LogAt(r2));
+  }
+
+ private:
+  const PhotoGain& gain_;
+  const Image& picture_;
+};
+
 }  // namespace
 
 PhotoGains GainsOf(const ExposureEstimate& estimate, const std::vector<Vec3d>& clipped) {
@@ -38,26 +56,33 @@ PhotoGains GainsOf(const ExposureEstimate& estimate, const std::vector<Vec3d>& c
 
 void UndoGain(const PhotoGain& gain, Image* photo) {
   if (gain == kAsTaken) return;
-  for (size_t i = 0; i < photo->pixels.size(); ++i) {
-    float& value = photo->pixels[i];
-    if (std::isnan(value)) continue;
-    const double factor = gain.light[static_cast<int>(i % 3)];
-    const double undone = SrgbFromLinear(std::min(1.0, LinearFromSrgb(value) / factor));
-    // A reduced photo has values in between at the edge of what was clipped.
-    const double t = std::clamp((value - kNearlyClipped) / (1 - kNearlyClipped), 0.0, 1.0);
-    const double up = factor > 1 ? gain.highlights * t * t * (3 - 2 * t) : 0;
-    value = static_cast<float>(undone + up * (1 - undone));
+  const GainOfPixel of_pixel(gain, *photo);
+  for (int64_t p = 0; p < photo->num_pixels(); ++p) {
+    const Vec3d factors = of_pixel(p);
+    for (int c = 0; c < 3; ++c) {
+      float& value = photo->pixels[static_cast<size_t>(3 * p + c)];
+      if (std::isnan(value)) continue;
+      const double factor = factors[c];
+      const double undone = SrgbFromLinear(std::min(1.0, LinearFromSrgb(value) / factor));
+      // A reduced photo has values in between at the edge of what was clipped.
+      const double t = std::clamp((value - kNearlyClipped) / (1 - kNearlyClipped), 0.0, 1.0);
+      const double up = factor > 1 ? gain.highlights * t * t * (3 - 2 * t) : 0;
+      value = static_cast<float>(undone + up * (1 - undone));
+    }
   }
 }
 
 void PutGain(const PhotoGain& gain, Image* picture) {
   if (gain == kAsTaken) return;
-  for (size_t i = 0; i < picture->pixels.size(); ++i) {
-    float& value = picture->pixels[i];
-    if (std::isnan(value)) continue;
-    const double light =
-        LinearFromSrgb(std::clamp(value, 0.0f, 1.0f)) * gain.light[static_cast<int>(i % 3)];
-    value = static_cast<float>(SrgbFromLinear(std::min(1.0, light)));
+  const GainOfPixel of_pixel(gain, *picture);
+  for (int64_t p = 0; p < picture->num_pixels(); ++p) {
+    const Vec3d factors = of_pixel(p);
+    for (int c = 0; c < 3; ++c) {
+      float& value = picture->pixels[static_cast<size_t>(3 * p + c)];
+      if (std::isnan(value)) continue;
+      const double light = LinearFromSrgb(std::clamp(value, 0.0f, 1.0f)) * factors[c];
+      value = static_cast<float>(SrgbFromLinear(std::min(1.0, light)));
+    }
   }
 }
 
@@ -70,12 +95,16 @@ void WriteGains(const std::string& poses, const Capture& capture,
   }
   JsonValue::Array rows;
   for (size_t v = 0; v < capture.views.size(); ++v) {
-    const PhotoExposure& photo = estimate.photos[v];
-    rows.push_back(JsonValue::Object{{"file", capture.views[v].file},
-                                     {"gain", Triple(photo.gain)},
-                                     {"highlights", gains.Of(static_cast<int>(v)).highlights},
-                                     {"log_error", Triple(photo.log_error)},
-                                     {"observations", photo.observations}});
+    const PhotoExposure photo = estimate.photos.empty() ? PhotoExposure() : estimate.photos[v];
+    const PhotoGain gain = gains.Of(static_cast<int>(v));
+    JsonValue row = JsonValue::Object{{"file", capture.views[v].file},
+                                      {"gain", Triple(gain.light)},
+                                      {"highlights", gain.highlights},
+                                      {"log_error", Triple(photo.log_error)},
+                                      {"observations", photo.observations}};
+    if (gain.falloff != LensFalloff{})
+      row["falloff"] = JsonValue::Array{gain.falloff.a, gain.falloff.b};
+    rows.push_back(std::move(row));
   }
   WriteJsonFile(path, JsonValue::Object{{"schema", kGainsSchema}, {"photos", std::move(rows)}});
 }
@@ -102,9 +131,13 @@ PhotoGains ReadGains(const std::string& poses, const Capture& capture) {
     fits =
         row.At("file").AsString() == capture.views[v].file && gain.size() == 3 &&
         std::ranges::all_of(gain, [](const JsonValue& value) { return value.AsDouble() > 0; });
-    if (fits)
-      gains.of_view.push_back({{gain[0].AsDouble(), gain[1].AsDouble(), gain[2].AsDouble()},
-                               row.At("highlights").AsDouble()});
+    if (!fits) break;
+    PhotoGain of_view{{gain[0].AsDouble(), gain[1].AsDouble(), gain[2].AsDouble()},
+                      row.At("highlights").AsDouble()};
+    if (const JsonValue* const falloff = row.Find("falloff"))
+      of_view.falloff = {falloff->AsArray().at(0).AsDouble(),
+                         falloff->AsArray().at(1).AsDouble()};
+    gains.of_view.push_back(of_view);
   }
   if (!fits)
     throw InputError("the stored exposures are not those of its photos",

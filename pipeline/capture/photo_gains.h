@@ -1,5 +1,5 @@
-// Gains of photos by exposure and white balance: undone where photos are read, and stored
-// beside the poses.
+// Gains of photos by exposure, white balance and the lens's falloff: undone where photos are
+// read, and stored beside the poses.
 #pragma once
 
 #include <string>
@@ -8,15 +8,17 @@
 #include "kernels/scene/capture.h"
 #include "pipeline/files/json_file.h"
 #include "reconstruct/refinement/exposure.h"
+#include "reconstruct/refinement/lens_falloff.h"
 
 namespace regrade {
 
-// What a camera's exposure and white balance made of one photo.
+// What a camera's exposure, white balance and lens made of one photo.
 struct PhotoGain {
   Vec3d light{1, 1, 1};  // its linear light is this times that of the capture's mean photo
   // Clipped values were at least this bright. They are moved this fraction of the way from
   // there to white: the part of what bright photos clip that dark photos clip, too.
   double highlights = 0;
+  LensFalloff falloff = {};
 
   bool operator==(const PhotoGain&) const = default;
 };
@@ -24,7 +26,7 @@ struct PhotoGain {
 // Leaves a photo unchanged, bit for bit.
 inline const PhotoGain kAsTaken{};
 
-// One for each view of the capture, or none at all where exposure is off.
+// One for each view of the capture, or none at all where nothing is undone.
 struct PhotoGains {
   std::vector<PhotoGain> of_view;
 

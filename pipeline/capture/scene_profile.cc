@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <optional>
 
 #include "kernels/base/error.h"
 #include "pipeline/capture/track_colors.h"
@@ -89,29 +90,59 @@ std::string GainsEvidence(const ExposureEstimate& exposure) {
          "a spread up to " + Short(Metric{kExposureSpread}) + " is not corrected";
 }
 
-// The row "exposure", and the gains if it is on.
-void ProfileExposure(const Capture& capture, const std::map<std::string, bool>& overrides,
-                     bool alpha, SceneProfile* profile) {
-  const auto override = overrides.find("exposure");
-  const bool requested = override != overrides.end() && override->second;
-  const auto leave_out = [&](const char* why) {
-    if (requested) throw SceneError(why, "--effects exposure=on");
-    profile->effects.push_back({"exposure", false, why, Metric(), kExposureSpread});
-  };
-  if (override != overrides.end() && !requested) return leave_out("off by --effects");
-  if (alpha) return leave_out("the white background of transparent photos has no exposure");
-  if (capture.points.empty())
-    return leave_out("the poses are without points to compare colours at");
-  const TrackColors colors = ReadTrackColors(capture);
-  profile->exposure =
-      EstimateExposure(static_cast<int>(capture.views.size()), colors.observations);
-  const ExposureEstimate& exposure = profile->exposure;
-  const bool on = requested || exposure.Pays();
+// The row "falloff", of a lens whose falloff is asked for: undoing it does not pay on every
+// capture whose corners are dark (COSTS.md), so nothing else switches it on.
+LensFalloff ProfileFalloff(int views, const std::vector<ColorObservation>& colors,
+                           SceneProfile* profile) {
+  const FalloffEstimate estimate = EstimateFalloff(views, colors);
   profile->effects.push_back(
-      Row("exposure", on, exposure.explained, exposure.Threshold(), GainsEvidence(exposure)));
-  if (!on) return;
-  profile->gains = GainsOf(exposure, colors.clipped);
-  NameUnknownPhotos(capture, profile);
+      Row("falloff", true, 1 - estimate.corner, estimate.Threshold(),
+          Format("share of the light that the lens's corners lose, standard error %.2g; it "
+                 "explains %.3g of what photos' colours differ by, standard error %.2g",
+                 estimate.corner_error, estimate.explained, estimate.explained_error)));
+  return estimate.falloff;
+}
+
+// The row "exposure", that of a falloff that is asked for, and the gains of what is on.
+void ProfileLight(const Capture& capture, const std::map<std::string, bool>& overrides,
+                  bool alpha, SceneProfile* profile) {
+  const auto wish = [&overrides](const char* name) {
+    const auto override = overrides.find(name);
+    return override == overrides.end() ? std::optional<bool>() : override->second;
+  };
+  const std::optional<bool> of_exposure = wish("exposure");
+  const bool falloff_on = wish("falloff").value_or(false);
+  const char* const why = alpha ? "the white background of transparent photos has no exposure"
+                          : capture.points.empty()
+                              ? "the poses are without points to compare colours at"
+                              : nullptr;
+  if (why != nullptr && (falloff_on || of_exposure.value_or(false)))
+    throw SceneError(why, falloff_on ? "--effects falloff=on" : "--effects exposure=on");
+  const bool no_exposure = why != nullptr || !of_exposure.value_or(true);
+  if (no_exposure)
+    profile->effects.push_back({"exposure", false,
+                                of_exposure.value_or(true) ? why : "off by --effects", Metric(),
+                                kExposureSpread});
+  if (no_exposure && !falloff_on) return;
+  const int views = static_cast<int>(capture.views.size());
+  TrackColors colors = ReadTrackColors(capture);
+  LensFalloff falloff;
+  if (falloff_on) {
+    falloff = ProfileFalloff(views, colors.observations, profile);
+    colors.observations = WithoutFalloff(std::move(colors.observations), falloff);
+  }
+  if (!no_exposure) {
+    profile->exposure = EstimateExposure(views, colors.observations);
+    const ExposureEstimate& exposure = profile->exposure;
+    const bool on = of_exposure.value_or(exposure.Pays());
+    profile->effects.push_back(
+        Row("exposure", on, exposure.explained, exposure.Threshold(), GainsEvidence(exposure)));
+    if (on) profile->gains = GainsOf(exposure, colors.clipped);
+    if (on) NameUnknownPhotos(capture, profile);
+  }
+  if (falloff == LensFalloff{}) return;
+  if (profile->gains.of_view.empty()) profile->gains.of_view.resize(capture.views.size());
+  for (PhotoGain& gain : profile->gains.of_view) gain.falloff = falloff;
 }
 
 }  // namespace
@@ -177,7 +208,7 @@ SceneProfile ProfileScene(const Capture& capture, int sh_degree, const std::stri
   if (box.near_clip >= 0) profile.scene.box.near_clip = box.near_clip;
   if (box.background >= 0)
     profile.scene.box.background = Vec3f{box.background, box.background, box.background};
-  ProfileExposure(capture, overrides, alpha, &profile);
+  ProfileLight(capture, overrides, alpha, &profile);
   return profile;
 }
 

@@ -6,6 +6,7 @@
 #include "kernels/scene/srgb.h"
 #include "pipeline/images/image_file.h"
 #include "reconstruct/refinement/exposure_folds.h"
+#include "reconstruct/refinement/lens_falloff.h"
 
 namespace regrade {
 namespace {
@@ -71,8 +72,10 @@ TrackColors ReadTrackColors(const Capture& capture) {
       double x = 0, y = 0;
       ColorObservation observation{static_cast<int32_t>(v), p, {}, folds[p]};
       if (view.camera.Project(capture.points[p].position, &x, &y) &&
-          WindowLight(photo, x, y, &observation.light))
+          WindowLight(photo, x, y, &observation.light)) {
+        observation.radius2 = Radius2(photo.width, photo.height, x, y);
         colors.observations.push_back(observation);
+      }
     }
   }
   return colors;

@@ -292,7 +292,7 @@ struct RenderReport {
   // spacing.
   Metric path_transmittance, path_photo_distance;
   FilmSize film;
-  double strength = 1;        // of the style, see EQ(style-mix)
+  double strength = 1;  // of the style, see EQ(style-mix)
   Metric frames_per_second;
   SeenByFewMetrics seen_by_few;
 

@@ -21,11 +21,11 @@
 #include "pipeline/workspace/output_names.h"
 #include "pipeline/workspace/stage_record.h"
 #include "stylize/image/color_transfer.h"
-#include "stylize/image/sample_colors.h"
 #include "stylize/image/gaussian_mixture.h"
 #include "stylize/image/map_stylizer.h"
 #include "stylize/image/mixture_transfer.h"
 #include "stylize/image/onnx_stylizer.h"
+#include "stylize/image/sample_colors.h"
 
 namespace regrade {
 namespace {

@@ -28,9 +28,9 @@ void RenderPart(const Stage& stage, RunContext* context);
 
 // What joining knows of how units were rendered.
 struct JoinedParts {
-  std::string device;  // of each kind, with commas between
-  double seconds = 0;                 // of rendering both fields
-  std::vector<std::string> films;     // names of those that were made
+  std::string device;              // of each kind, with commas between
+  double seconds = 0;              // of rendering both fields
+  std::vector<std::string> films;  // names of those that were made
 };
 
 // Throws Error(kInput), which names the units of the stage that nobody rendered.

@@ -189,9 +189,7 @@ class AttemptRunner::Impl {
         MapArguments(attempt.strategy, static_cast<int>(photos_.size()), threads_, paths);
     fs::remove_all(paths.model);
     fs::create_directories(paths.model);
-    // A lens that is given is a model to start from, which parts have not.
     if (attempt.freedom != LensFreedom::kFull) {
-      attempt.strategy.in_parts = false;
       const std::string start = attempt.folder + "/start", output = paths.model + "/0";
       fs::create_directories(start);
       fs::create_directories(output);
@@ -199,7 +197,7 @@ class AttemptRunner::Impl {
       MapFrom(start, output, attempt.freedom, &arguments);
     }
     const ChildResult result =
-        RunColmap(MapCommand(attempt.strategy), arguments, "mapping", attempt.Name(), weight);
+        RunColmap("mapper", arguments, "mapping", attempt.Name(), weight);
     attempt.evidence = output_.evidence();
     std::string damage;
     std::set<fs::path> folders;

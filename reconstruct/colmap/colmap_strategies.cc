@@ -22,12 +22,10 @@ constexpr size_t kFewPairs = 15;
 constexpr size_t kMostForAllPairs = 150;
 // Of many photos, each is matched with so many that look most like it.
 constexpr int kSimilarPhotos = 20;
-// The vocabulary is learned from the features of so many photos.
-constexpr int kPhotosOfVocabulary = 200, kVisualWords = 16384;
-// The global adjustments of one mapper cost more and more. Above so many photos, they are
-// mapped in parts of at most so many, of which neighbours share so many.
-constexpr size_t kMostForOneMapper = 600;
-constexpr int kPhotosOfPart = 250, kSharedPhotos = 50;
+// The vocabulary is learned from the features of so many photos, in a tree of so many branches:
+// COLMAP's 65536 words of all photos in a tree of 256 take one thread far longer.
+constexpr int kPhotosOfVocabulary = 100, kVisualWords = 8192, kBranches = 32, kRounds = 5,
+              kBranchChecks = 64;
 
 std::string Text(double value) { return Format("%.9g", value); }
 
@@ -67,7 +65,6 @@ std::vector<PoseStrategy> PoseStrategies(const std::vector<StagedPhoto>& photos,
   quick.first_octave = side < kSmallSide || photos.size() <= kFewPairs ? -1 : 0;
   quick.lens = simple_lens ? ColmapLens::kSimpleRadial : ColmapLens::kOpenCv;
   quick.pairing = PairingOf(photos, static_cast<size_t>(all_pairs_up_to));
-  quick.in_parts = photos.size() > kMostForOneMapper;
 
   PoseStrategy finer = quick;
   finer.name = "more features";
@@ -86,7 +83,6 @@ std::vector<PoseStrategy> PoseStrategies(const std::vector<StagedPhoto>& photos,
   thorough.keep_matches = false;
   thorough.max_features = quick.pairing == Pairing::kAll ? 8192 : 4096;
   if (photos.size() <= kMostForAllPairs) thorough.pairing = Pairing::kAll;
-  thorough.in_parts = false;
   thorough.lens = ColmapLens::kSimpleRadial;
   thorough.focal_factor = 0.75;
   return {quick, finer, relaxed, thorough};
@@ -141,6 +137,9 @@ std::vector<MatchStep> MatchSteps(const PoseStrategy& strategy, int threads,
            {{"database_path", paths.database},
             {"vocab_tree_path", paths.vocabulary},
             {"num_visual_words", std::to_string(kVisualWords)},
+            {"branching", std::to_string(kBranches)},
+            {"num_iterations", std::to_string(kRounds)},
+            {"num_checks", std::to_string(kBranchChecks)},
             {"max_num_images", std::to_string(kPhotosOfVocabulary)}},
            0.1},
           {"vocab_tree_matcher",
@@ -149,13 +148,9 @@ std::vector<MatchStep> MatchSteps(const PoseStrategy& strategy, int threads,
            0.6}};
 }
 
-std::string MapCommand(const PoseStrategy& strategy) {
-  return strategy.in_parts ? "hierarchical_mapper" : "mapper";
-}
-
 ColmapArguments MapArguments(const PoseStrategy& strategy, int num_photos, int threads,
                              const ColmapPaths& paths) {
-  ColmapArguments arguments = {
+  return {
       {"database_path", paths.database},
       {"image_path", paths.photos},
       {"output_path", paths.model},
@@ -170,11 +165,6 @@ ColmapArguments MapArguments(const PoseStrategy& strategy, int num_photos, int t
       {"Mapper.init_min_num_inliers", std::to_string(strategy.init_inliers)},
       {"Mapper.abs_pose_min_num_inliers", std::to_string(strategy.min_inliers)},
   };
-  if (strategy.in_parts) {
-    arguments.push_back({"leaf_max_num_images", std::to_string(kPhotosOfPart)});
-    arguments.push_back({"image_overlap", std::to_string(kSharedPhotos)});
-  }
-  return arguments;
 }
 
 }  // namespace regrade

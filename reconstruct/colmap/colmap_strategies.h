@@ -26,7 +26,6 @@ struct PoseStrategy {
   ColmapLens lens = ColmapLens::kOpenCv;  // of the mapper; the final lens is fitted later
   double focal_factor = 1.2;  // initial focal length over the longer side, without EXIF
   Pairing pairing = Pairing::kAll;
-  bool in_parts = false;       // mapped in overlapping parts that are joined
   bool keep_matches = false;   // reuse features and matches of the previous attempt
   double init_angle_deg = 16;  // least angle between the rays of the first two photos
   int init_inliers = 100;      // least matches between them
@@ -67,7 +66,6 @@ struct MatchStep {
 };
 std::vector<MatchStep> MatchSteps(const PoseStrategy& strategy, int threads,
                                   const ColmapPaths& paths);
-std::string MapCommand(const PoseStrategy& strategy);
 ColmapArguments MapArguments(const PoseStrategy& strategy, int num_photos, int threads,
                              const ColmapPaths& paths);
 

@@ -133,7 +133,10 @@ class TrackFinder {
       strategy.lens = group.camera.lens;
       ColmapArguments arguments =
           ExtractArguments(strategy, group.photos, options_.image_size, options_.threads,
-                           {PhotoFolder(), Database(), list, "", options_.mask_folder});
+                           {.photos = PhotoFolder(),
+                            .database = Database(),
+                            .image_list = list,
+                            .masks = options_.mask_folder});
       arguments.push_back({"ImageReader.camera_params", ParametersOf(group.camera)});
       RunColmap("feature_extractor", arguments, "features",
                 weight * static_cast<double>(group.photos.names.size()) /

@@ -84,14 +84,6 @@ LogColors BestGains(const ExposureData& data, size_t num_views) {
   return gains;
 }
 
-double JackknifeError(const std::vector<double>& without) {
-  const auto n = static_cast<double>(without.size());
-  const double mean = std::accumulate(without.begin(), without.end(), 0.0) / n;
-  double squares = 0;
-  for (const double x : without) squares += (x - mean) * (x - mean);
-  return std::sqrt((n - 1) / n * squares);
-}
-
 // See EQ(exposure-pays).
 void Explain(const std::vector<double>& before, const std::vector<double>& after,
              ExposureEstimate* estimate) {

@@ -16,8 +16,9 @@ namespace regrade {
 struct ColorObservation {
   int32_t view = 0;
   int32_t point = 0;
-  Vec3d light;       // linear, each channel > 0, not clipped
-  int32_t fold = 0;  // of its point, in [0, kExposureFolds); see SpatialFolds
+  Vec3d light;         // linear, each channel > 0, not clipped
+  int32_t fold = 0;    // of its point, in [0, kExposureFolds); see SpatialFolds
+  double radius2 = 0;  // squared distance from the picture's middle over half its diagonal
 };
 
 // Number of parts of the scene that are left out in turn (exposure_folds.h).

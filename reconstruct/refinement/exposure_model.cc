@@ -18,10 +18,6 @@ constexpr double kConverged = 1e-5;  // change of a log gain
 
 using Index = Eigen::Index;
 
-double Weight(const Vec3d& residual) {  // rho'
-  return 1 / std::sqrt(1 + Dot(residual, residual) / kSquaredScale);
-}
-
 double Loss(const Vec3d& residual) {
   // rho(s) without the cancellation of its textbook form at small s.
   const double s = Dot(residual, residual);
@@ -105,6 +101,18 @@ void FixMeans(const ExposureData& data, const std::vector<bool>& used,
 
 }  // namespace
 
+double ExposureWeight(const Vec3d& residual) {
+  return 1 / std::sqrt(1 + Dot(residual, residual) / kSquaredScale);
+}
+
+double JackknifeError(const std::vector<double>& without) {
+  const auto n = static_cast<double>(without.size());
+  const double mean = std::accumulate(without.begin(), without.end(), 0.0) / n;
+  double squares = 0;
+  for (const double x : without) squares += (x - mean) * (x - mean);
+  return std::sqrt((n - 1) / n * squares);
+}
+
 ExposureData ArrangeObservations(size_t num_views,
                                  const std::vector<ColorObservation>& observations) {
   ExposureData data;
@@ -116,7 +124,8 @@ ExposureData ArrangeObservations(size_t num_views,
     data.observations.push_back(
         {static_cast<size_t>(o.view),
          static_cast<size_t>(o.point),
-         {std::log(o.light.x), std::log(o.light.y), std::log(o.light.z)}});
+         {std::log(o.light.x), std::log(o.light.y), std::log(o.light.z)},
+         o.radius2});
   }
   data.fold_of_point.resize(num_points);
   for (const ColorObservation& o : observations) data.fold_of_point[o.point] = o.fold;
@@ -154,7 +163,7 @@ Vec3d RobustColor(const ExposureData& data, size_t point, const LogColors& gains
     double weights = 0;
     for (size_t i = begin; i < end; ++i) {
       const Vec3d seen = data.observations[i].log_light - gains[data.observations[i].view];
-      const double w = step == 0 ? 1 : Weight(seen - color);
+      const double w = step == 0 ? 1 : ExposureWeight(seen - color);
       sum += seen * w, weights += w;
     }
     const Vec3d next = sum / weights;
@@ -184,7 +193,7 @@ LogColors ReweightedGains(const ExposureData& data, int without_fold, const LogC
     for (size_t i = 0; i < weights.size(); ++i) {
       const Observation& s = data.observations[i];
       const bool counts = used[s.view] && !left_out(s.point);
-      weights[i] = counts ? Weight(s.log_light - gains[s.view] - colors[s.point]) : 0;
+      weights[i] = counts ? ExposureWeight(s.log_light - gains[s.view] - colors[s.point]) : 0;
     }
     LogColors next = WeightedGains(data, weights, gains.size());
     FixMeans(data, used, start, &next);

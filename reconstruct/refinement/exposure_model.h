@@ -18,6 +18,7 @@ using LogColors = std::vector<Vec3d>;
 struct Observation {
   size_t view, point;
   Vec3d log_light;
+  double radius2 = 0;
 };
 
 struct ExposureData {
@@ -34,6 +35,12 @@ ExposureData ArrangeObservations(size_t num_views,
                                  const std::vector<ColorObservation>& observations);
 
 constexpr int kNoFold = -1;
+
+// rho' of EQ(exposure) at a residual.
+double ExposureWeight(const Vec3d& residual);
+
+// Of a statistic without each fold in turn; see EQ(exposure-pays).
+double JackknifeError(const std::vector<double>& without);
 
 // The minimum over all points except those of a fold, starting at `start`. Photos with fewer
 // than kFewestColors remaining observations get log gain 0. Each group's mean is that of

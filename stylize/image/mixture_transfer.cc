@@ -4,10 +4,10 @@
 
 #include "kernels/base/error.h"
 #include "kernels/image/color_statistics.h"
-#include "stylize/image/sample_colors.h"
 #include "stylize/image/map_stylizer.h"
 #include "stylize/image/mixture_transport.h"
 #include "stylize/image/monge_kantorovich.h"
+#include "stylize/image/sample_colors.h"
 
 namespace regrade {
 namespace {

@@ -26,10 +26,10 @@
 #include "pipeline/images/contact_sheet.h"
 #include "pipeline/images/image_file.h"
 #include "stylize/image/color_transfer.h"
-#include "stylize/image/sample_colors.h"
 #include "stylize/image/gaussian_mixture.h"
 #include "stylize/image/mixture_transfer.h"
 #include "stylize/image/onnx_stylizer.h"
+#include "stylize/image/sample_colors.h"
 
 namespace regrade {
 namespace {

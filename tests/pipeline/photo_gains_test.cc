@@ -147,6 +147,21 @@ TEST(PhotoGains, PutBackIsTheInverse) {
     EXPECT_NEAR(photo.pixels[i], before.pixels[i], 1e-6);
 }
 
+TEST(PhotoGains, FalloffDarkensTheCornersAndIsUndone) {
+  Image photo(65, 49);
+  std::ranges::fill(photo.pixels, 0.5f);
+  const Image before = photo;
+  const PhotoGain gain{{1.2, 1, 1}, 0, {-0.5, -0.3}};
+  PutGain(gain, &photo);
+  const auto light = [&photo](int x, int y) { return LinearFromSrgb(photo.at(x, y)[1]); };
+  EXPECT_NEAR(light(32, 24) / LinearFromSrgb(0.5f), 1, 1e-5);
+  EXPECT_NEAR(light(0, 0) / LinearFromSrgb(0.5f), std::exp(-0.8), 0.03);
+  EXPECT_NEAR(light(64, 48), light(0, 0), 1e-6);
+  UndoGain(gain, &photo);
+  for (size_t i = 0; i < photo.pixels.size(); ++i)
+    EXPECT_NEAR(photo.pixels[i], before.pixels[i], 1e-6);
+}
+
 // Pixels that are left out stay left out, whatever the gain.
 TEST(PhotoGains, NanStaysNan) {
   Image photo(1, 1);
@@ -185,12 +200,15 @@ TEST(PhotoGains, AreStoredBesideThePoses) {
   estimate.photos.resize(2);
   estimate.photos[1].gain = {1.1, 0.9, 1 / 3.0};
   estimate.photos[1].known = true;
-  const PhotoGains gains = GainsOf(estimate, {{0.1, 0.1, 0.1}, {0.1, 0.1, 0.1}});
+  PhotoGains gains = GainsOf(estimate, {{0.1, 0.1, 0.1}, {0.1, 0.1, 0.1}});
   WriteGains(poses, capture, estimate, gains);
   EXPECT_EQ(ReadJsonFile(file).At("schema").AsInt(), 1);
   EXPECT_EQ(StoredGainRows(poses).AsArray().size(), 2u);
   EXPECT_EQ(ReadGains(poses, capture).Of(0), kAsTaken);
   EXPECT_EQ(ReadGains(poses, capture).Of(1), (PhotoGain{{1.1, 0.9, 1 / 3.0}, 1}));
+  for (PhotoGain& gain : gains.of_view) gain.falloff = {-0.25, 1 / 7.0};
+  WriteGains(poses, capture, {}, gains);  // falloff without exposure
+  EXPECT_EQ(ReadGains(poses, capture).of_view, gains.of_view);
   capture.views[1].file = "c.jpg";
   EXPECT_REGRADE_ERROR(ReadGains(poses, capture), ExitCode::kInput,
                        "--restart-from reconstruct");

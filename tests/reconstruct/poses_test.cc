@@ -146,12 +146,6 @@ TEST_F(Poses, WithoutAVocabularyTheOrderOfNamesIsLeft) {
   EXPECT_NE(report_.notes[0].find("vocab_tree_builder"), std::string::npos);
 }
 
-TEST_F(Poses, VeryManyPhotosAreMappedInParts) {
-  EXPECT_EQ(Run("good", 1000).views.size(), 1000u);
-  EXPECT_TRUE(fs::exists(folder_ / "work/logs/hierarchical_mapper.log"));
-  EXPECT_FALSE(fs::exists(folder_ / "work/logs/mapper.log"));
-}
-
 TEST_F(Poses, ManyPhotosOfADroneAreMatchedByTheirPlaces) {
   meters_apart_ = 25;
   EXPECT_EQ(Run("good", 160).views.size(), 160u);

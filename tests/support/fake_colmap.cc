@@ -50,11 +50,12 @@ std::vector<std::string> KnownOptions() {
           "SequentialMatching.overlap",
           "vocab_tree_path",
           "num_visual_words",
+          "branching",
+          "num_iterations",
+          "num_checks",
           "max_num_images",
           "VocabTreeMatching.vocab_tree_path",
           "VocabTreeMatching.num_images",
-          "leaf_max_num_images",
-          "image_overlap",
           "Mapper.num_threads",
           "Mapper.min_model_size",
           "Mapper.init_min_tri_angle",
@@ -257,7 +258,7 @@ int main(int argc, char** argv) {
   }
   if (Is("empty")) return 0;
   if (command == "feature_extractor") return Extract();
-  if (command == "mapper" || command == "hierarchical_mapper") return Map();
+  if (command == "mapper") return Map();
   if (command == "bundle_adjuster") return Adjust();
   if (command == "point_triangulator") return Triangulate();
   if (command == "vocab_tree_builder") {
