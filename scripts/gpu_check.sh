@@ -9,7 +9,7 @@
 # Exit status of run: 0, or 1 if a test fails or the sanitizer finds an error.
 set -euo pipefail
 
-usage() { sed -n '2,10p' "${BASH_SOURCE[0]}" | sed 's/^# \{0,1\}//'; }
+usage() { sed -n '2,9p' "${BASH_SOURCE[0]}" | sed 's/^# \{0,1\}//'; }
 [[ "${1:-}" != --help ]] || { usage; exit 0; }
 [[ $# -eq 2 ]] || { usage >&2; exit 2; }
 tests=(device_parity_test device_splat_fit_test device_splats_test device_style_test device_training_test)

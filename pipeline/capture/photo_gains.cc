@@ -134,9 +134,11 @@ PhotoGains ReadGains(const std::string& poses, const Capture& capture) {
     if (!fits) break;
     PhotoGain of_view{{gain[0].AsDouble(), gain[1].AsDouble(), gain[2].AsDouble()},
                       row.At("highlights").AsDouble()};
-    if (const JsonValue* const falloff = row.Find("falloff"))
-      of_view.falloff = {falloff->AsArray().at(0).AsDouble(),
-                         falloff->AsArray().at(1).AsDouble()};
+    if (const JsonValue* const falloff = row.Find("falloff")) {
+      const JsonValue::Array& ab = falloff->AsArray();
+      fits = ab.size() == 2;
+      if (fits) of_view.falloff = {ab[0].AsDouble(), ab[1].AsDouble()};
+    }
     gains.of_view.push_back(of_view);
   }
   if (!fits)

@@ -45,7 +45,7 @@ const std::array<const FitKind*, 2>& FitKinds();
 // Of the field that the settings name.
 const FitKind& FitKindOf(const RunSettings& settings);
 
-// One photo in so many is fitted to the settings' field, as the function of that name says.
+// As the function of that name, of a draft of splats; 1 for every other fit.
 int64_t OnePhotoIn(const RunSettings& settings, const FitPlace& place);
 
 // What a person should know of the fit's memory before it begins: that less than it takes is

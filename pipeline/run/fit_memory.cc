@@ -68,7 +68,7 @@ FitOptions AdaptedTo(const FitOptions& options, const FitPlace& place) {
 
 int64_t OnePhotoIn(const FitPlace& place,
                    const std::function<StagePlan(const FitPlace&)>& plan) {
-  if (!MayLower(place)) return 1;
+  if (place.max_memory_gb <= 0) return 1;
   FitPlace half = place;
   half.pixels /= 2, half.photos /= 2;
   const auto memory = [&plan](const FitPlace& of) {
@@ -76,8 +76,9 @@ int64_t OnePhotoIn(const FitPlace& place,
   };
   const double of_photos = 2 * (memory(place) - memory(half));
   const double room = kMostOfMemory * static_cast<double>(LimitOf(place));
-  return std::clamp<int64_t>(std::llround(std::ceil(of_photos / room)), 1,
-                             std::max<int64_t>(1, place.photos / kLeastPhotos));
+  const double most =
+      std::max(1.0, static_cast<double>(place.photos) / static_cast<double>(kLeastPhotos));
+  return static_cast<int64_t>(std::clamp(std::ceil(of_photos / room), 1.0, std::floor(most)));
 }
 
 std::string FewerPhotosText(int64_t one_in, int64_t fitted, const FitPlace& place) {

@@ -1,5 +1,4 @@
-// What the choice of the paper's configuration depends on, measured. Apart from paper_config.h,
-// because regrade_gpu reads no pictures.
+// What the choice of the paper's configuration depends on, measured.
 #pragma once
 
 #include "kernels/scene/capture.h"

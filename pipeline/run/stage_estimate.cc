@@ -47,7 +47,7 @@ double RenderSeconds(const RunSettings& settings, const CaptureSize& size) {
              static_cast<double>(SamplesOfFilm(render.film_seconds, render.fps).moments.size());
     film = FilmFrames(render.film_seconds, render.fps) * Megapixels(size, render.film_size);
   }
-  return kFrame * views + kFilmFrame * film;
+  return kFrame * views + (settings.scene.field == "voxels" ? kFrame : kFilmFrame) * film;
 }
 
 double EvaluateSeconds(const RunSettings& settings, const CaptureSize& size) {

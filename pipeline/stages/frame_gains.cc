@@ -23,7 +23,9 @@ FrameSource UndoGains(const FrameSource& frames, const PhotoGains& gains) {
   if (gains.of_view.empty()) return frames;
   return {frames.count, [frames, gains](int k) {
             Image frame = frames.frame(k);
-            UndoGain({gains.Of(k).light}, &frame);  // highlights are what cameras clip
+            PhotoGain gain = gains.Of(k);
+            gain.highlights = 0;
+            UndoGain(gain, &frame);  // highlights are what cameras clip
             return frame;
           }};
 }

@@ -40,22 +40,29 @@ int64_t PixelsOf(const WorkingViews& views, const std::vector<int>& photos) {
 }
 
 FitPlace PlaceOf(const RunSettings& settings, const WorkingViews& views,
-                 const std::vector<int>& photos, const NormalizedScene& scene) {
+                 const std::vector<int>& photos) {
   return {.backend = ChooseBackend(settings.run.device, settings.run.reproducible),
           .pixels = PixelsOf(views, photos),
           .photos = std::ssize(photos),
-          .box = scene.box,
           .max_memory_gb = settings.run.max_memory_gb,
           .reproducible = settings.run.reproducible};
 }
 
-// Of the photos that are not held out those that memory has room for.
-std::vector<int> PhotosWithinMemory(const RunSettings& settings, const FitPlace& of_all,
-                                    const std::vector<int>& all) {
-  const int64_t one_in = OnePhotoIn(settings, of_all);
-  std::vector<int> some;
-  for (size_t i = 0; i < all.size(); i += static_cast<size_t>(one_in)) some.push_back(all[i]);
-  return some;
+// The photos that are fitted: of those that are not held out one in so many.
+struct PhotosOfFit {
+  std::vector<int> views;
+  int64_t one_in = 1;
+  std::string notice;  // if there are fewer for memory's sake
+};
+
+PhotosOfFit PhotosWithinMemory(const RunSettings& settings, const WorkingViews& views) {
+  const std::vector<int> all = views.Training();
+  const FitPlace place = PlaceOf(settings, views, all);
+  PhotosOfFit fit{{}, OnePhotoIn(settings, place), ""};
+  for (size_t i = 0; i < all.size(); i += static_cast<size_t>(fit.one_in))
+    fit.views.push_back(all[i]);
+  if (fit.one_in > 1) fit.notice = FewerPhotosText(fit.one_in, std::ssize(fit.views), place);
+  return fit;
 }
 
 // Decides whether the fit keeps its spherical harmonics, with the evidence.
@@ -109,13 +116,12 @@ StageOutcome Reconstruct(RunContext* context, const JsonValue& inputs,
   for (const EffectReport& effect : profile.effects)
     if (effect.name != kViewDependence) context->console->Detail(EffectLine(effect));
   for (const std::string& notice : profile.notices) context->console->Info(notice);
-  const std::vector<int> all = views.Training();
-  const FitPlace of_all = PlaceOf(settings, views, all, scene);
-  const std::vector<int> training = PhotosWithinMemory(settings, of_all, all);
-  const FitPlace place = PlaceOf(settings, views, training, scene);
+  const PhotosOfFit chosen = PhotosWithinMemory(settings, views);
+  const std::vector<int>& training = chosen.views;
+  FitPlace place = PlaceOf(settings, views, training);
+  place.box = scene.box;
   const Backend backend = place.backend;
-  if (training.size() < all.size())
-    context->console->Info(FewerPhotosText(OnePhotoIn(settings, of_all), place.photos, of_all));
+  if (!chosen.notice.empty()) context->console->Info(chosen.notice);
   const std::unique_ptr<FieldFit> fit = FitKindOf(settings).make(settings, place);
   for (const std::string& sentence : fit->FitIntoMemory()) context->console->Info(sentence);
 
@@ -224,13 +230,17 @@ Stage ReconstructStage(RunContext* context) {
                                    {"effects", run.effects},
                                    {"reproducible", run.reproducible}};
   stage.refuse_changes = true;
+  const bool posed = context->workspace->Find("pose").has_value();
+  if (posed && run.max_memory_gb > 0)
+    if (const PhotosOfFit chosen = PhotosWithinMemory(context->settings, context->Views());
+        chosen.one_in > 1)
+      stage.inputs["one_photo_in"] = chosen.one_in;
   if (context->settings.start.dry_run) {
     const WorkingViews views = context->Views();
-    const std::vector<int> all = views.Training();
-    const NormalizedScene scene = SceneOfRun(context->settings, views.capture());
-    const FitPlace of_all = PlaceOf(context->settings, views, all, scene);
-    const FitPlace place = PlaceOf(context->settings, views,
-                                   PhotosWithinMemory(context->settings, of_all, all), scene);
+    const PhotosOfFit chosen = PhotosWithinMemory(context->settings, views);
+    FitPlace place = PlaceOf(context->settings, views, chosen.views),
+             of_all = PlaceOf(context->settings, views, views.Training());
+    place.box = of_all.box = SceneOfRun(context->settings, views.capture()).box;
     stage.plan = "about " +
                  SizeText(FitKindOf(context->settings).plan(context->settings, place).memory) +
                  " of memory";

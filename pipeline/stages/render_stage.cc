@@ -1,9 +1,8 @@
 // Stage "render": frames of the field before and after styling, and of the 2D method applied to
 // the former, at the photos' positions and along the film's camera path; and the films. Where
 // photos differ in size or lens, the frames at their positions are rendered again with one
-// common camera. The film's frames may come from the fast renderer; those that are measured are
-// exact. The 2D method styles frames at the photos' positions, and of the film those on which
-// it is measured.
+// common camera. The 2D method styles frames at the photos' positions, and of the film those on
+// which it is measured.
 #include <algorithm>
 #include <filesystem>
 #include <future>

@@ -165,10 +165,13 @@ class AttemptRunner::Impl {
         try {
           RunStage(step.command, step.arguments, "matching", strategy.name,
                    weight * step.weight);
+        } catch (const Crash&) {
+          throw;
         } catch (const Error& e) {
-          if (e.code() != ExitCode::kExternalProgram || &step == &steps.front()) throw;
-          report_.notes.push_back(
-              "photos are matched in the order of their names only, since " + e.what_failed());
+          if (e.code() != ExitCode::kExternalProgram || &step == &steps.front() || TimeIsOver())
+            throw;
+          report_.notes.push_back("photos are matched mainly in the order of their names: " +
+                                  e.what_failed());
           return;
         }
       }

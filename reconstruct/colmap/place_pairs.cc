@@ -11,7 +11,7 @@ namespace regrade {
 namespace {
 
 constexpr int kNearPhotos = 20;
-constexpr size_t kPhotosInOrder = 5;   // on each side
+constexpr size_t kPhotosInOrder = 5;   // that follow
 constexpr double kMostPhotos = 0.9;    // of the photos know their place
 constexpr double kReceiverError = 10;  // meters
 
@@ -30,9 +30,11 @@ Places PlacesOf(const std::vector<StagedPhoto>& photos) {
       known.push_back(*photos[i].gps);
       places.photos.push_back(i);
     }
+  const bool heights =
+      std::ranges::none_of(known, [](const GeoPosition& place) { return place.altitude == 0; });
   for (const Vec3d& place : LocalMeters(known))
     places.meters.push_back({static_cast<float>(place[0]), static_cast<float>(place[1]),
-                             static_cast<float>(place[2])});
+                             heights ? static_cast<float>(place[2]) : 0});
   places.near = NearestPoints(places.meters, kNearPhotos);
   return places;
 }

@@ -14,7 +14,7 @@ bool PlacesTellPhotosApart(const std::vector<StagedPhoto>& photos);
 
 // Unique pairs in ascending order: each photo with those taken nearest to it, and with its
 // neighbours in the order of names, which photos without a place have alone. The cost grows
-// with the number of photos.
+// linearly with the number of photos.
 PhotoPairs PairsOfPlaces(const std::vector<StagedPhoto>& photos);
 
 }  // namespace regrade

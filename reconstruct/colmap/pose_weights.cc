@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "reconstruct/colmap/listed_pairs.h"
+
 namespace regrade {
 namespace {
 
@@ -23,7 +25,8 @@ double Megapixels(const std::vector<StagedPhoto>& photos, int image_size) {
 PoseWeights EstimateWeights(const PoseStrategy& strategy,
                             const std::vector<StagedPhoto>& photos, int image_size) {
   const double n = static_cast<double>(photos.size());
-  const bool many = strategy.pairing == Pairing::kSimilar;
+  const bool many = strategy.pairing == Pairing::kSimilar ||
+                    (strategy.pairing == Pairing::kListed && !HasClips(photos));
   const double pairs =
       strategy.pairing == Pairing::kAll ? n * (n - 1) / 2 : std::min(many ? 30.0 : 10.0, n) * n;
   const double size = strategy.max_features / 2048.0;

@@ -159,7 +159,7 @@ TEST(Plan, SplatsAreLoweredToMemory) {
 }
 
 // Photos of a street that take more than a given memory are thinned, and never to fewer than
-// a scene needs; without a limit of its own a reproducible fit keeps them all.
+// a scene needs; without a limit all are kept.
 TEST(Plan, PhotosAreThinnedToMemory) {
   SplatFitOptions options;
   options.thousands = 100, options.sh_degree = 2, options.steps = 100;
@@ -178,7 +178,7 @@ TEST(Plan, PhotosAreThinnedToMemory) {
   EXPECT_LT(static_cast<double>(plan(thinned).memory), place.max_memory_gb * 1e9);
   place.max_memory_gb = 1e-9;
   EXPECT_EQ(OnePhotoIn(place, plan), 200);
-  place.max_memory_gb = 0, place.reproducible = true;
+  place.max_memory_gb = 0;
   EXPECT_EQ(OnePhotoIn(place, plan), 1);
 }
 
