@@ -82,7 +82,7 @@ int64_t OnePhotoIn(const FitPlace& place,
 }
 
 std::string FewerPhotosText(int64_t one_in, int64_t fitted, const FitPlace& place) {
-  return Concat("one photo in ", one_in, " is fitted, ", fitted, " of ", place.photos) +
+  return Concat("one photo in ", one_in, " is fitted, ", fitted, " of ", place.photos, ",") +
          ToFitInto(place);
 }
 
