@@ -16,23 +16,20 @@ constexpr double kNearlyClipped = 0.98;  // encoded
 
 JsonValue Triple(const Vec3d& v) { return JsonValue::Array{v.x, v.y, v.z}; }
 
-// What a pixel's light was multiplied by, in each channel.
-class GainOfPixel {
- public:
-  GainOfPixel(const PhotoGain& gain, const Image& picture) : gain_(gain), picture_(picture) {}
-
-  Vec3d operator()(int64_t pixel) const {
-    if (gain_.falloff == LensFalloff{}) return gain_.light;
-    const auto x = static_cast<double>(pixel % picture_.width),
-               y = static_cast<double>(pixel / picture_.width);
-    const double r2 = Radius2(picture_.width, picture_.height, x + 0.5, y + 0.5);
-    return gain_.light * std::exp(gain_.falloff.LogAt(r2));
+// Calls `change` with each value of an RGB picture, but NaN, and the factor of its light.
+template <typename Change>
+void ForEachValue(const PhotoGain& gain, Image* picture, const Change& change) {
+  const bool even = gain.falloff == LensFalloff{};
+  for (int64_t p = 0; p < picture->num_pixels(); ++p) {
+    const auto x = static_cast<double>(p % picture->width),
+               y = static_cast<double>(p / picture->width);
+    const double r2 = even ? 0 : Radius2(picture->width, picture->height, x + 0.5, y + 0.5);
+    const Vec3d factors = even ? gain.light : gain.light * std::exp(gain.falloff.LogAt(r2));
+    for (int c = 0; c < 3; ++c)
+      if (float& value = picture->pixels[static_cast<size_t>(3 * p + c)]; !std::isnan(value))
+        value = change(value, factors[c]);
   }
-
- private:
-  const PhotoGain& gain_;
-  const Image& picture_;
-};
+}
 
 }  // namespace
 
@@ -56,34 +53,21 @@ PhotoGains GainsOf(const ExposureEstimate& estimate, const std::vector<Vec3d>& c
 
 void UndoGain(const PhotoGain& gain, Image* photo) {
   if (gain == kAsTaken) return;
-  const GainOfPixel of_pixel(gain, *photo);
-  for (int64_t p = 0; p < photo->num_pixels(); ++p) {
-    const Vec3d factors = of_pixel(p);
-    for (int c = 0; c < 3; ++c) {
-      float& value = photo->pixels[static_cast<size_t>(3 * p + c)];
-      if (std::isnan(value)) continue;
-      const double factor = factors[c];
-      const double undone = SrgbFromLinear(std::min(1.0, LinearFromSrgb(value) / factor));
-      // A reduced photo has values in between at the edge of what was clipped.
-      const double t = std::clamp((value - kNearlyClipped) / (1 - kNearlyClipped), 0.0, 1.0);
-      const double up = factor > 1 ? gain.highlights * t * t * (3 - 2 * t) : 0;
-      value = static_cast<float>(undone + up * (1 - undone));
-    }
-  }
+  ForEachValue(gain, photo, [&gain](float value, double factor) {
+    const double undone = SrgbFromLinear(std::min(1.0, LinearFromSrgb(value) / factor));
+    // A reduced photo has values in between at the edge of what was clipped.
+    const double t = std::clamp((value - kNearlyClipped) / (1 - kNearlyClipped), 0.0, 1.0);
+    const double up = factor > 1 ? gain.highlights * t * t * (3 - 2 * t) : 0;
+    return static_cast<float>(undone + up * (1 - undone));
+  });
 }
 
 void PutGain(const PhotoGain& gain, Image* picture) {
   if (gain == kAsTaken) return;
-  const GainOfPixel of_pixel(gain, *picture);
-  for (int64_t p = 0; p < picture->num_pixels(); ++p) {
-    const Vec3d factors = of_pixel(p);
-    for (int c = 0; c < 3; ++c) {
-      float& value = picture->pixels[static_cast<size_t>(3 * p + c)];
-      if (std::isnan(value)) continue;
-      const double light = LinearFromSrgb(std::clamp(value, 0.0f, 1.0f)) * factors[c];
-      value = static_cast<float>(SrgbFromLinear(std::min(1.0, light)));
-    }
-  }
+  ForEachValue(gain, picture, [](float value, double factor) {
+    const double light = LinearFromSrgb(std::clamp(value, 0.0f, 1.0f)) * factor;
+    return static_cast<float>(SrgbFromLinear(std::min(1.0, light)));
+  });
 }
 
 void WriteGains(const std::string& poses, const Capture& capture,

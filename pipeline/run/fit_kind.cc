@@ -22,7 +22,7 @@ const FitKind& FitKindOf(const RunSettings& settings) {
 }
 
 int64_t OnePhotoIn(const RunSettings& settings, const FitPlace& place) {
-  if (settings.run.preset != "draft" || settings.scene.field != kSplatFit.name) return 1;
+  if (settings.run.preset != "draft") return 1;
   return OnePhotoIn(place, [&settings](const FitPlace& of) {
     return FitKindOf(settings).plan(settings, of);
   });

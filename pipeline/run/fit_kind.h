@@ -24,6 +24,8 @@ struct FitKind {
   const char* name;       // "voxels" or "splats", as --field has it
   const char* work_unit;  // to which the time of a fit's steps is proportional
   std::array<const char*, 2> work_options;  // which change it
+  // Rough seconds of two threads (AMD EPYC) for a million pixels of a film, of both fields.
+  double film_frame;
 
   JsonValue (*options)(const RunSettings& settings);
   int (*sh_degree)(const RunSettings& settings);
@@ -45,7 +47,7 @@ const std::array<const FitKind*, 2>& FitKinds();
 // Of the field that the settings name.
 const FitKind& FitKindOf(const RunSettings& settings);
 
-// As the function of that name, of a draft of splats; 1 for every other fit.
+// As the function of that name for a draft; 1 for every other fit.
 int64_t OnePhotoIn(const RunSettings& settings, const FitPlace& place);
 
 // What a person should know of the fit's memory before it begins: that less than it takes is

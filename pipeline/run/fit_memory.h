@@ -29,9 +29,8 @@ struct FitPlace {
 StagePlan PlanFitAt(const FitPlace& place, const FitOptions& options);
 StagePlan PlanSplatsAt(const FitPlace& place, const SplatFitOptions& options);
 
-// Of many photos one in so many is fitted, so that they leave a quarter of --max-memory to the
-// field; 1 where all do, and without that limit. `plan`: of a place, before anything is
-// lowered.
+// Fitting one photo in so many leaves a quarter of --max-memory to the field; 1 where all do,
+// and without that limit. `plan`: of a place, before anything is lowered.
 int64_t OnePhotoIn(const FitPlace& place,
                    const std::function<StagePlan(const FitPlace&)>& plan);
 // "one photo in 3 is fitted, 117 of 350, to fit into --max-memory"

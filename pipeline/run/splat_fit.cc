@@ -128,6 +128,7 @@ std::unique_ptr<FieldFit> MakeSplatFit(const RunSettings& settings, const FitPla
 const FitKind kSplatFit{.name = "splats",
                         .work_unit = "planned seconds",
                         .work_options = {"splat-steps", "splats"},
+                        .film_frame = 0.75,
                         .options = OptionsOfSplats,
                         .sh_degree = DegreeOfSplats,
                         .check = CheckSplatSettings,

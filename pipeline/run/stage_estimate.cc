@@ -11,10 +11,10 @@ namespace regrade {
 namespace {
 
 // Seconds with two threads (AMD EPYC) for a million pixels: of files that are decoded, of
-// photos that the 2D method styles, of frames with both fields and the 2D method, of the
-// film's, and of compared pairs; and of a report with its page.
-constexpr double kDecode = 0.03, kStyle2d = 0.17, kFrame = 2.3, kFilmFrame = 0.75, kPair = 0.55,
-                 kReport = 3, kPageOfMillionVoxels = 3.75;
+// photos that the 2D method styles, of frames with both fields and the 2D method, and
+// of compared pairs; and of a report with its page.
+constexpr double kDecode = 0.03, kStyle2d = 0.17, kFrame = 2.3, kPair = 0.55, kReport = 3,
+                 kPageOfMillionVoxels = 3.75;
 constexpr double kAroundFit = 1.16;        // the trial of degrees, pruning and measuring
 constexpr double kOfResidual = 1.5;        // of frames at the photos' places
 constexpr double kFasterOnCard = 1.0 / 8;  // training and frames, roughly
@@ -47,7 +47,7 @@ double RenderSeconds(const RunSettings& settings, const CaptureSize& size) {
              static_cast<double>(SamplesOfFilm(render.film_seconds, render.fps).moments.size());
     film = FilmFrames(render.film_seconds, render.fps) * Megapixels(size, render.film_size);
   }
-  return kFrame * views + (settings.scene.field == "voxels" ? kFrame : kFilmFrame) * film;
+  return kFrame * views + FitKindOf(settings).film_frame * film;
 }
 
 double EvaluateSeconds(const RunSettings& settings, const CaptureSize& size) {

@@ -151,6 +151,7 @@ std::unique_ptr<FieldFit> MakeVoxelFit(const RunSettings& settings, const FitPla
 const FitKind kVoxelFit{.name = "voxels",
                         .work_unit = "ray voxels",
                         .work_options = {"fit-steps", "fit-resolutions"},
+                        .film_frame = 2.1,
                         .options = OptionsOfVoxels,
                         .sh_degree = DegreeOfVoxels,
                         .check = CheckVoxelSettings,

@@ -165,10 +165,10 @@ class AttemptRunner::Impl {
         try {
           RunStage(step.command, step.arguments, "matching", strategy.name,
                    weight * step.weight);
-        } catch (const Crash&) {
-          throw;
         } catch (const Error& e) {
-          if (e.code() != ExitCode::kExternalProgram || &step == &steps.front() || TimeIsOver())
+          const bool again = threads_ != 1 && dynamic_cast<const Crash*>(&e) != nullptr;
+          if (e.code() != ExitCode::kExternalProgram || &step == &steps.front() || again ||
+              TimeIsOver())
             throw;
           report_.notes.push_back("photos are matched mainly in the order of their names: " +
                                   e.what_failed());

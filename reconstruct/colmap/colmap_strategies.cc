@@ -20,7 +20,7 @@ constexpr size_t kFewPhotos = 20;
 constexpr size_t kFewPairs = 15;
 // The cost of matching all pairs grows with the square.
 constexpr size_t kMostForAllPairs = 150;
-// Of many photos, each is matched with so many that look most like it.
+// Each of many photos is matched with so many that look most like it.
 constexpr int kSimilarPhotos = 20;
 // The vocabulary is learned from the features of so many photos, in a tree of so many branches:
 // COLMAP's 65536 words of all photos in a tree of 256 take one thread far longer.

@@ -15,7 +15,7 @@ namespace regrade {
 enum class Pairing {
   kAll,     // all with all
   kOrder,   // each with its neighbours in the order of names
-  kListed,  // the pairs of ListedPairs
+  kListed,  // the pairs of PairsOfClips or PairsOfPlaces
   kSimilar  // as kOrder, and each with those that look most like it, by a vocabulary tree
 };
 

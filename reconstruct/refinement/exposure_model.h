@@ -39,7 +39,7 @@ constexpr int kNoFold = -1;
 // rho' of EQ(exposure) at a residual.
 double ExposureWeight(const Vec3d& residual);
 
-// Of a statistic without each fold in turn; see EQ(exposure-pays).
+// The error of a statistic from its values without each fold in turn; see EQ(exposure-pays).
 double JackknifeError(const std::vector<double>& without);
 
 // The minimum over all points except those of a fold, starting at `start`. Photos with fewer

@@ -99,12 +99,10 @@ class DeviceTraining::CapturedSteps {
     steps.made = state.step - begun_from_;
     steps.stopped = state.halted != 0;
     if (steps.stopped) steps.gradient = optimizer_.Gradient();
-    std::vector<StepStats> stats(static_cast<size_t>(stats_.size()));
-    stats_.CopyOut(stats.data(), stats_.size());
-    for (int64_t i = begun_from_; i < state.step; ++i) {
-      const StepStats& step = stats[static_cast<size_t>(i % stats_.size())];
-      steps.touched_voxels += step.touched;
-      if (i + 1 < state.step) continue;
+    if (steps.made > 0) {
+      std::vector<StepStats> stats(static_cast<size_t>(stats_.size()));
+      stats_.CopyOut(stats.data(), stats_.size());
+      const StepStats& step = stats[static_cast<size_t>((state.step - 1) % stats_.size())];
       steps.last = {step.loss, step.squared_error, static_cast<int64_t>(step.rays),
                     step.touched, step.samples};
       const double voxels = LossDivisor(field_, options_);

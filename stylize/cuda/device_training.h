@@ -33,7 +33,6 @@ class DeviceTraining {
   struct Steps {
     int64_t made = 0;             // fewer than started where two in a row were not finite
     AggregationResult last;       // of the last one
-    double touched_voxels = 0;    // summed over the steps
     bool stopped = false;         // two in a row were not finite
     std::vector<float> gradient;  // of the last step, if it stopped
   };

@@ -35,7 +35,6 @@ struct StepRequest {
 struct StepResult {
   int64_t made = 0;              // fewer than asked for where training stopped
   AggregationResult last;        // of the last one
-  double touched_voxels = 0;     // summed over the steps
   bool stopped = false;          // two in a row, earlier calls' included, were not finite
   std::vector<double> gradient;  // of the last step, if it stopped
 };

@@ -41,7 +41,6 @@ StepResult HostSteps::Make(const WeightUpdate& update, const StepRequest& reques
       network->WarmUpNorms();
     std::vector<double> gradient(network->NumParameters(), 0.0);
     result.last = loss->Run(*network, batch, &gradient);
-    result.touched_voxels += static_cast<double>(result.last.touched_voxels);
     const int64_t step = request.first + result.made++;
     const bool finite = UpdateWeights(update, step, &gradient, network, adam);
     rejected_in_a_row_ = finite ? 0 : rejected_in_a_row_ + 1;

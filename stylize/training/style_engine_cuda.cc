@@ -55,7 +55,6 @@ class CudaStyleEngine : public StyleEngine {
     if (lags) network->WarmUpNorms();
     return {.made = steps.made,
             .last = steps.last,
-            .touched_voxels = steps.touched_voxels,
             .stopped = steps.stopped,
             .gradient = {steps.gradient.begin(), steps.gradient.end()}};
   }

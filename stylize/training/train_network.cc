@@ -98,8 +98,6 @@ class Training {
   LipschitzNetwork network_;
   TrainingState state_;  // without the network, which is network_
   TrainNetworkResult result_;
-  double touched_ = 0;
-  int64_t steps_here_ = 0;
 };
 
 ColorMap Training::BetterMap(double* mse) {
@@ -205,8 +203,6 @@ StepResult Training::Advance(int64_t most) {
   request.meanwhile = [this, next = first + std::ssize(request.batches)] { DrawRays(next); };
   StepResult steps = engine_.Step(update_, request, &network_, &state_.adam);
   state_.step += steps.made;
-  steps_here_ += steps.made;
-  touched_ += steps.touched_voxels;
   const Geometry& geometry = *field_.geometry;
   result_.loss_balance =
       3.0 * static_cast<double>(steps.last.rays) /
