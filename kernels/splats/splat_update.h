@@ -86,9 +86,10 @@ struct SplatUpdate {
     *value = *value > bound ? bound : *value < -bound ? -bound : *value;
   }
 
-  void SetStep(uint64_t number) {
+  // Adam's moments were 0 at the step `from`.
+  void SetStep(uint64_t number, uint64_t from = 0) {
     step = number;
-    const int64_t t = static_cast<int64_t>(number) + 1;
+    const int64_t t = static_cast<int64_t>(number - from) + 1;
     inverse_correction1 = static_cast<float>(1 / AdamBiasCorrection(double{beta1}, t));
     inverse_correction2 = static_cast<float>(1 / AdamBiasCorrection(double{beta2}, t));
   }

@@ -27,7 +27,7 @@ BlockPlan PlanOf(const RunContext& context, const WorkingViews& views,
 std::vector<int> BlocksToMake(const BlockPlan& plan, const BlockFolder& folder,
                               const std::string& part) {
   std::vector<int> order;
-  for (int block = 0; block < folder.blocks(); ++block) order.push_back(block);
+  for (int block = 0; block < folder.fits(); ++block) order.push_back(block);
   std::ranges::stable_sort(
       order, {}, [&](int block) { return plan.blocks[static_cast<size_t>(block)].turn; });
   const auto [number, parts] = part.empty() ? PartNumber() : ParsePart(part);
@@ -52,7 +52,7 @@ bool MakeBlock(const RunContext& context, const WorkingViews& views, const Store
     lock.emplace(folder.LockPath(block), LockUse::kAlone);
   } catch (const Error& error) {
     if (error.code() != ExitCode::kFolderInUse) throw;
-    context.console->Info(Concat("block ", block + 1, " is being made by another process"));
+    context.console->Info(BlockName(plan, block) + " is being made by another process");
     return false;
   }
   if (folder.Find(block)) return false;

@@ -83,9 +83,15 @@ std::optional<BlockRecord> BlockFolder::Find(int block) const {
   return MetricsFromJson<BlockRecord>(ReadJsonFile(record));
 }
 
+int BlockFolder::fits() const {
+  const std::optional<BlockPlan> plan = Plan();
+  return plan ? static_cast<int>(plan->blocks.size()) : blocks_;
+}
+
 std::vector<int> BlockFolder::Missing() const {
   std::vector<int> missing;
-  for (int block = 0; block < blocks_; ++block)
+  const int all = fits();
+  for (int block = 0; block < all; ++block)
     if (!Find(block)) missing.push_back(block);
   return missing;
 }
@@ -104,7 +110,7 @@ void BlockFolder::Begin() const {
 std::optional<BlockPlan> BlockFolder::Plan() const {
   if (!fs::exists(Path(kPlan))) return std::nullopt;
   BlockPlan plan = PlanFromJson(ReadJsonFile(Path(kPlan)));
-  if (std::ssize(plan.blocks) != blocks_)
+  if (std::ranges::count(plan.blocks, -1, &SpaceBlock::first) != blocks_)
     throw InputError("is not a plan of " + Counted(blocks_, "block"), Path(kPlan),
                      "remove this folder");
   return plan;
@@ -140,16 +146,26 @@ void RepairField(const RunContext& context) {
                    "run `regrade reconstruct` again");
 }
 
+std::string BlockName(const BlockPlan& plan, int block) {
+  const int first = plan.blocks[static_cast<size_t>(block)].first;
+  return first < 0 ? Concat("block ", block + 1) : Concat("last turn of block ", first + 1);
+}
+
 std::string BlocksText(const std::vector<int>& blocks, int all, const char* verb_of_one,
                        const char* verb_of_more) {
   constexpr size_t kNamed = 8;
   std::vector<std::string> names;
-  for (size_t i = 0; i < std::min(kNamed, blocks.size()); ++i)
-    names.push_back(std::to_string(blocks[i] + 1));
-  if (blocks.size() > kNamed) names.push_back("...");
-  const bool one = blocks.size() == 1;
-  return Concat(one ? "block " : "blocks ", Join(names, ", "), " of ", all,
-                one ? verb_of_one : verb_of_more);
+  for (const int block : blocks)
+    if (block < all) names.push_back(std::to_string(block + 1));
+  const size_t last_turns = blocks.size() - names.size();
+  std::string text;
+  if (!names.empty()) {
+    text = names.size() == 1 ? "block " : "blocks ";
+    if (names.size() > kNamed) names.resize(kNamed), names.push_back("...");
+    text += Join(names, ", ") + Concat(" of ", all);
+  }
+  if (last_turns > 0) text += (text.empty() ? "" : " and ") + Counted(last_turns, "last turn");
+  return text + (blocks.size() == 1 ? verb_of_one : verb_of_more);
 }
 
 }  // namespace regrade

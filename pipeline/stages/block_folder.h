@@ -54,6 +54,8 @@ class BlockFolder {
   bool IsJoined() const { return joined_; }
   const std::string& path() const { return work_->path(); }
   int blocks() const { return blocks_; }
+  // How many: as the plan's entries, and before there is a plan as blocks.
+  int fits() const;
   std::string Path(const std::string& name) const { return work_->Path(name); }
   std::string OtherSettings() const { return work_->OtherSettings(); }
   std::string FieldPath(int block) const;  // block: from 0 on
@@ -85,8 +87,10 @@ inline std::string BlockStage(int block) { return Concat("block-", block + 1); }
 // the field before it back. Throws Error(kInput) where the field was changed otherwise.
 void RepairField(const RunContext& context);
 
-// "blocks 2, 5, 7 of 8 are missing", of the verbs " is missing" and " are missing"; counted
-// from 1 here.
+// "block 2", "last turn of block 2".
+std::string BlockName(const BlockPlan& plan, int block);
+// "blocks 2, 5, 7 of 8 and 3 last turns are missing", of the verbs " is missing" and
+// " are missing"; counted from 1 here.
 std::string BlocksText(const std::vector<int>& blocks, int all, const char* verb_of_one = "",
                        const char* verb_of_more = "");
 

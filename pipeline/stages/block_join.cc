@@ -29,7 +29,7 @@ struct Joined {
 Joined ReadBlocks(const BlockFolder& folder, const BlockPlan& plan) {
   Joined joined;
   double squared = 0, weights = 0;
-  for (int block = 0; block < folder.blocks(); ++block) {
+  for (int block = 0; block < std::ssize(plan.blocks); ++block) {
     const BlockRecord record = *folder.Find(block);
     const StoredField stored = ReadFieldFile(folder.FieldPath(block));
     const SplatsView<float> splats = SplatsOf(stored.field);
@@ -163,7 +163,7 @@ void JoinBlocks(RunContext* context, const BlockFolder& folder) {
   Console* const console = context->console;
   if (const std::vector<int> missing = folder.Missing(); !missing.empty()) {
     const std::string others =
-        std::ssize(missing) == folder.blocks() ? folder.OtherSettings() : "";
+        std::ssize(missing) == folder.fits() ? folder.OtherSettings() : "";
     throw InputError(Concat(BlocksText(missing, folder.blocks(), " is missing", " are missing"),
                             others.empty() ? "" : "; ", others),
                      folder.path(),
@@ -217,7 +217,7 @@ void JoinBlocks(RunContext* context, const BlockFolder& folder) {
   workspace.Record("reconstruct", before.inputs, outputs, before.seconds, record.metrics,
                    before.cpu_seconds);
   folder.Drop();
-  for (int block = 0; block < folder.blocks(); ++block)
+  for (int block = 0; block < std::ssize(plan.blocks); ++block)
     workspace.DropCheckpoint(BlockStage(block));
   console->EndStage();
   const auto text = [](const Metric& metric) {

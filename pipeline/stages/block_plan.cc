@@ -120,6 +120,7 @@ JsonValue PlanToJson(const BlockPlan& plan) {
                                   {"after", numbers(block.after)},
                                   {"turn", block.turn},
                                   {"share", block.share},
+                                  {"first", block.first},
                                   {"views", numbers(plan.views[i])}});
   }
   return json;
@@ -134,10 +135,10 @@ BlockPlan PlanFromJson(const JsonValue& json) {
   };
   BlockPlan plan;
   for (const JsonValue& value : json.AsArray()) {
-    plan.blocks.push_back({HoldFromJson(value.At("owned")), HoldFromJson(value.At("held")),
-                           numbers(value.At("after")),
-                           static_cast<int>(value.At("turn").AsInt()),
-                           value.At("share").AsDouble()});
+    plan.blocks.push_back(
+        {HoldFromJson(value.At("owned")), HoldFromJson(value.At("held")),
+         numbers(value.At("after")), static_cast<int>(value.At("turn").AsInt()),
+         value.At("share").AsDouble(), static_cast<int>(value.At("first").AsInt())});
     plan.views.push_back(numbers(value.At("views")));
   }
   return plan;

@@ -63,9 +63,10 @@ class SplatFitter {
       state.first_moment = Splats(state.splats.count(), 1);
       state.second_moment = state.first_moment;
     }
-    step_ = state.step;
+    first_step_ = At(options_.begin);
+    step_ = std::max(state.step, first_step_);
     frozen_ = state.frozen;
-    if (step_ == 0) state.spare_unseen = ShareInPicture(state.splats) < kFewSeen;
+    if (state.tally.pixels == 0) state.spare_unseen = ShareInPicture(state.splats) < kFewSeen;
     spare_unseen_ = state.spare_unseen;
     tally_ = std::move(state.tally);
     engine_->SetState(std::move(state));
@@ -174,7 +175,7 @@ class SplatFitter {
     update.opacity_weight = options_.opacity_weight / splats;
     update.scale_weight = options_.scale_weight / (3 * splats);
     update.seed = options_.seed;
-    update.SetStep(static_cast<uint64_t>(step_));
+    update.SetStep(static_cast<uint64_t>(step_), static_cast<uint64_t>(first_step_));
     engine_->Step(step);
     ++step_;
     if (step_ % kWindow == 0) CloseWindow();
@@ -282,7 +283,7 @@ class SplatFitter {
   float extent_ = 1;
   int64_t most_ = 0, frozen_ = 0;
   bool spare_unseen_ = false;
-  int step_ = 0, round_ = -1;
+  int first_step_ = 0, step_ = 0, round_ = -1;
   std::vector<int> order_;
   SplatFitTally tally_;
   double start_ = 0, last_checkpoint_ = 0, idle_ = 0;

@@ -36,7 +36,7 @@ struct SplatFitTally {
 struct SplatFitState {
   Splats splats, first_moment, second_moment;
   int64_t frozen = 0;         // the first ones, which the fit does not change
-  bool spare_unseen = false;  // see SplatUpdate; decided at step 0
+  bool spare_unseen = false;  // see SplatUpdate; decided before the first step
   int step = 0;
   SplatFitTally tally;
 };

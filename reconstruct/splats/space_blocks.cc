@@ -51,7 +51,10 @@ class Division {
           taken[static_cast<size_t>(blocks_[j].turn)] = true;
       blocks_[i].turn = static_cast<int>(std::ranges::find(taken, false) - taken.begin());
     }
-    for (size_t i = 0; i < blocks_.size(); ++i) AddRims(i);
+    const size_t count = blocks_.size();
+    std::vector<std::vector<int>> beside(count);
+    for (size_t i = 0; i < count; ++i) beside[i] = AddRims(i);
+    AddLastTurns(beside);
     return std::move(blocks_);
   }
 
@@ -100,18 +103,42 @@ class Division {
   }
 
   // A rim is no wider than the narrowest block at the face wants it: outer ones have far
-  // places.
-  void AddRims(size_t i) {
+  // places. Returns the neighbours.
+  std::vector<int> AddRims(size_t i) {
+    std::vector<int> beside;
     Vec3f low = widths_[i], high = widths_[i];
     for (size_t j = 0; j < blocks_.size(); ++j) {
       const std::optional<Face> face = FaceOf(blocks_[i].owned, blocks_[j].owned);
       if (!face) continue;
       float& width = (face->upper ? high : low)[face->axis];
       width = std::min(width, widths_[j][face->axis]);
+      beside.push_back(static_cast<int>(j));
       if (blocks_[j].turn < blocks_[i].turn) blocks_[i].after.push_back(static_cast<int>(j));
     }
     blocks_[i].held.low = blocks_[i].owned.low - low * kBlockRim;  // without an end it stays so
     blocks_[i].held.high = blocks_[i].owned.high + high * kBlockRim;
+    return beside;
+  }
+
+  // Those that neighbours waited for, in the order of their turns.
+  void AddLastTurns(const std::vector<std::vector<int>>& beside) {
+    const int turns = 1 + std::ranges::max(blocks_, {}, &SpaceBlock::turn).turn;
+    std::vector<int> last(beside.size(), -1);
+    for (int turn = 0; turn < turns - 1; ++turn)
+      for (size_t i = 0; i < beside.size(); ++i) {
+        const auto waits = [&](int j) { return blocks_[static_cast<size_t>(j)].turn > turn; };
+        if (blocks_[i].turn != turn || std::ranges::none_of(beside[i], waits)) continue;
+        SpaceBlock more = blocks_[i];
+        more.after = beside[i];
+        more.after.push_back(static_cast<int>(i));
+        for (const int j : beside[i])
+          if (last[static_cast<size_t>(j)] >= 0)
+            more.after.push_back(last[static_cast<size_t>(j)]);
+        more.turn = turns + turn;
+        more.first = static_cast<int>(i);
+        last[i] = static_cast<int>(blocks_.size());
+        blocks_.push_back(std::move(more));
+      }
   }
 
   static constexpr double kFew = 0.05;  // of places, that a spread leaves out on either side

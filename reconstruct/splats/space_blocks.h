@@ -13,6 +13,10 @@
 // too: of a neighbour that comes later, what it makes there is given up; of one before it, it
 // is kept, for it fits both sides of the face at once, and what is behind the rim as it is.
 // Blocks that meet in an edge or a corner alone may be fitted at the same time.
+//
+// A block of an early turn has seen its later neighbours as they were before. So it has a last
+// turn at the end, with them as they became, for the last part of its steps: an entry of its
+// own, of the same place.
 #pragma once
 
 #include <vector>
@@ -28,8 +32,10 @@ struct SpaceBlock {
   std::vector<int> after;  // neighbours that are fitted before it
   int turn = 0;            // its colour: those of earlier turns are fitted first
   double share = 0;        // of all places, those that are held
+  int first = -1;          // of a last turn: the block whose it is
 };
-inline constexpr float kBlockRim = 0.1f;  // of the width of the narrower block at a face
+inline constexpr float kLastTurnBegin = 0.75f;  // part of the steps that it leaves out
+inline constexpr float kBlockRim = 0.1f;        // of the width of the narrower block at a face
 
 // Does the block keep what it makes at this place (world), until a later one takes it over?
 bool Keeps(const std::vector<SpaceBlock>& blocks, size_t block, const float* place);
@@ -37,8 +43,8 @@ bool Keeps(const std::vector<SpaceBlock>& blocks, size_t block, const float* pla
 int OwnerOf(const std::vector<SpaceBlock>& blocks, const float* place);
 
 // `places`: points in the field's frame, one for each of about equally many pixels. Each block
-// has the same number of them, up to rounding. Throws Error(kUsage) where there are fewer than
-// kLeastPlaces for a block.
+// has the same number of them, up to rounding; the first `blocks` entries are they. Throws
+// Error(kUsage) where there are fewer than kLeastPlaces for a block.
 std::vector<SpaceBlock> DivideSpace(std::vector<Vec3f> places, const GridFrame& box,
                                     int blocks);
 inline constexpr int64_t kLeastPlaces = 200;

@@ -40,6 +40,7 @@ struct SplatFitOptions {
   // than that of means fall to `fall` of what they were, so that what this stirs settles.
   int long_from = 4000;
   float dropout = 0.1f, fall = 0.1f;
+  float begin = 0;  // part of all steps that a refinement leaves out
   uint64_t seed = 0;
 
   template <typename Bind>

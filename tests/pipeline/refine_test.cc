@@ -86,7 +86,7 @@ TEST_F(Refine, AJoinNamesWhatIsMissing) {
   const std::string coarse = ReadText(folder_ / "o/field.npz");
   const ProgramOutcome joined = RefineWith({"--join"});
   EXPECT_EQ(joined.code, static_cast<int>(ExitCode::kInput));
-  EXPECT_NE(joined.text.find("of 3 are missing"), std::string::npos) << joined.text;
+  EXPECT_NE(joined.text.find("of 3 and"), std::string::npos) << joined.text;
   // Of other settings all are missing, and which differ is said.
   const ProgramOutcome other = Regrade({"refine", folder_ / "o", "--blocks", "3", "--splats",
                                         "5", "--splat-steps", "90", "--join"});

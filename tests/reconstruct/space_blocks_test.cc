@@ -31,10 +31,16 @@ int64_t CountIn(const std::vector<Vec3f>& places, const SplatHold& hold) {
                                [&](const Vec3f& place) { return hold.Contains(&place.x); });
 }
 
+// Without last turns.
+std::vector<SpaceBlock> FirstOf(std::vector<SpaceBlock> blocks) {
+  std::erase_if(blocks, [](const SpaceBlock& block) { return block.first >= 0; });
+  return blocks;
+}
+
 TEST(SpaceBlocks, EachPlaceIsOwnedOnceAndAllOwnAsMany) {
   const std::vector<Vec3f> places = Street(9000);
   for (const int n : {1, 2, 3, 8, 13}) {
-    const std::vector<SpaceBlock> blocks = DivideSpace(places, kBox, n);
+    const std::vector<SpaceBlock> blocks = FirstOf(DivideSpace(places, kBox, n));
     ASSERT_EQ(std::ssize(blocks), n);
     for (const SpaceBlock& block : blocks)
       EXPECT_NEAR(CountIn(places, block.owned), 9000.0 / n, 2) << n;
@@ -64,7 +70,7 @@ TEST(SpaceBlocks, AStreetIsCutAcross) {
 
 TEST(SpaceBlocks, NeighborsTakeTurnsAndALaterOneTakesItsRimOver) {
   const std::vector<Vec3f> places = Street(9000);
-  const std::vector<SpaceBlock> blocks = DivideSpace(places, kBox, 4);
+  const std::vector<SpaceBlock> blocks = FirstOf(DivideSpace(places, kBox, 4));
   // In a row: every other one waits for those beside it.
   std::vector<size_t> row(blocks.size());
   for (size_t i = 0; i < row.size(); ++i) row[i] = i;
@@ -88,6 +94,39 @@ TEST(SpaceBlocks, NeighborsTakeTurnsAndALaterOneTakesItsRimOver) {
     EXPECT_GT(blocks[second].share, 0.25);
   }
   for (const Vec3f& place : places) EXPECT_GE(OwnerOf(blocks, &place.x), 0);
+}
+
+TEST(SpaceBlocks, ABlockThatCameFirstHasALastTurn) {
+  for (const int n : {2, 4, 13}) {
+    const std::vector<Vec3f> places = Street(9000);
+    const std::vector<SpaceBlock> blocks = DivideSpace(places, kBox, n);
+    int last = 0;
+    for (int i = 0; i < n; ++i) last = std::max(last, blocks[static_cast<size_t>(i)].turn);
+    std::vector<int> entries(static_cast<size_t>(n));
+    for (size_t i = 0; i < blocks.size(); ++i) {
+      const SpaceBlock& block = blocks[i];
+      for (const int before : block.after)
+        EXPECT_LT(blocks[static_cast<size_t>(before)].turn, block.turn);
+      if (i < static_cast<size_t>(n)) continue;
+      EXPECT_GT(block.turn, last);
+      // It goes on from its own splats and its neighbours' of all turns.
+      ASSERT_NE(std::ranges::find(block.after, block.first), block.after.end());
+      EXPECT_EQ(block.owned.low.x, blocks[static_cast<size_t>(block.first)].owned.low.x);
+      ++entries[static_cast<size_t>(block.first)];
+      for (const Vec3f& place : places)
+        if (block.owned.Contains(&place.x)) {
+          const int owner = OwnerOf(blocks, &place.x);
+          EXPECT_GE(blocks[static_cast<size_t>(owner)].turn, block.turn);
+        }
+    }
+    for (int i = 0; i < n; ++i) {
+      const bool is_waited_for =
+          std::any_of(blocks.begin(), blocks.begin() + n, [&](const SpaceBlock& other) {
+            return std::ranges::find(other.after, i) != other.after.end();
+          });
+      EXPECT_EQ(entries[static_cast<size_t>(i)], is_waited_for ? 1 : 0) << n << ' ' << i;
+    }
+  }
 }
 
 TEST(SpaceBlocks, TooFewPlacesAreRefused) {
