@@ -110,7 +110,7 @@ double SplatSeconds(const SplatFitOptions& options, int64_t photo_pixels, int64_
   const double pixels =
       static_cast<double>(photo_pixels) / static_cast<double>(std::max<int64_t>(photos, 1));
   const double part = 1 - 0.75 * double{options.small_until};  // steps at half size
-  return options.steps *
+  return options.steps * (1 - double{options.begin}) *
          (of_pixel * pixels * part + of_splat * 500.0 * double{options.thousands});
 }
 
