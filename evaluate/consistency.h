@@ -18,7 +18,7 @@ struct ConsistencyOptions {
   std::string mode = "lai2018";
   std::string flow = "dis-medium";
   std::string warp = "later", error_per = "channel";
-  std::string lpips, edges, style_features, style_embedding;
+  std::string lpips, edges;
   double min_coverage = 0.4;
   bool controls = false, control_field = false;  // the caller adds the sequences
   // Frames come in excerpts of that many, and pairs lie within one; 0: all are one sequence.
@@ -72,18 +72,6 @@ struct ConsistencyOptions {
                  "height, width] from 0 to 1",
          .runs = "*|!gradient",
          .constant = true});
-    bind("style-features", style_features,
-         {.help = "ONNX file of a network with one input, RGB from -1 to 1, whose outputs [1, "
-                  "channels, ...] are features (VGG's): distances of Gram matrices and of "
-                  "Fréchet to the style picture, and with --lpips a number like ArtFID",
-          .runs = "*",
-          .constant = true});
-    bind("style-embedding", style_embedding,
-         {.help = "ONNX file of a network with one input [1, 3, 224, 224], RGB from -1 to 1, "
-                  "whose output is a picture's vector (CLIP's): 1 - cosine to the style "
-                  "picture's",
-          .runs = "*",
-          .constant = true});
     bind(
         "min-coverage", min_coverage,
         {.unit = "fraction of pixels",

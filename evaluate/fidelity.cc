@@ -126,7 +126,7 @@ class FidelitySums {
     } else if (measured.db) {
       ++perfect_;
     }
-    AddByNetworks(task.frames[s], task.target);
+    AddByNetwork(task.frames[s], task.target);
   }
 
   FidelityRow Row(const ColourSlices& style) const {
@@ -145,24 +145,13 @@ class FidelitySums {
     if (targets_.style != nullptr)
       row.sliced_wasserstein_to_style = SlicedWasserstein(colours_, style);
     row.edge_ssim = edge_ssim_.Value();
-    row.lpips_to_unstyled = lpips_to_unstyled_.Value();
-    if (!targets_.style_features) return row;
-    row.gram_to_style = to_style_.Gram();
-    row.frechet_to_style = to_style_.Frechet();
-    row.embedding_to_style = to_style_.Embedding();
-    if (row.lpips_to_unstyled && row.frechet_to_style)
-      row.artfid_like = ArtFidLike(*row.lpips_to_unstyled, *row.frechet_to_style);
     return row;
   }
 
  private:
-  // Networks run one at a time, each in parallel.
-  void AddByNetworks(const Image& frame, const FrameTargets& target) {
-    if (targets_.style_features) to_style_.Add(frame);
-    if (!targets_.perceptual) return;
-    if (targets_.style_features && !target.unstyled.empty())
-      lpips_to_unstyled_.Add(targets_.perceptual(frame, target.unstyled));
-    if (target.view_2d.empty()) return;
+  // A network runs on one picture at a time, in parallel.
+  void AddByNetwork(const Image& frame, const FrameTargets& target) {
+    if (!targets_.perceptual || target.view_2d.empty()) return;
     Image whole = target.view_2d;  // excluded pixels are copied: they add no difference
     for (size_t v = 0; v < whole.pixels.size(); ++v)
       if (!std::isfinite(whole.pixels[v])) whole.pixels[v] = frame.pixels[v];
@@ -173,8 +162,7 @@ class FidelitySums {
   const FidelityTargets& targets_;
   HueChroma hues_, hues_2d_;
   ColourSlices colours_;
-  StyleDistances to_style_{targets_.style_features};
-  OptionalMean lpips_, structure_, edge_ssim_, lpips_to_unstyled_;
+  OptionalMean lpips_, structure_, edge_ssim_;
   double sum_db_ = 0;
   int finite_ = 0, perfect_ = 0;
 };

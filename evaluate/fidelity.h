@@ -3,13 +3,11 @@
 #pragma once
 
 #include <functional>
-#include <memory>
 #include <vector>
 
 #include "evaluate/edge_map.h"
 #include "evaluate/fidelity_row.h"
 #include "evaluate/frame_source.h"
-#include "evaluate/style_distance.h"
 #include "kernels/base/progress.h"
 
 namespace regrade {
@@ -24,7 +22,6 @@ struct FidelityTargets {
   FrameSource unstyled = {};                                     // each frame before styling
   bool only_psnr = false;                                        // measures nothing else
   EdgeMapFunction edges = {};
-  std::shared_ptr<const StyleFeatures> style_features = nullptr;
 };
 
 // One row for each sequence, in one pass: a frame of `targets` is read once for all of them,

@@ -6,8 +6,7 @@
 
 namespace regrade {
 
-// Sets `perceptual`, `edges` and, where there is a style picture, `style_features`, which the
-// picture passes through once. Errors: those of the networks.
+// Sets `perceptual` and `edges`. Errors: those of the networks.
 void OpenNetworks(const ConsistencyOptions& options, FidelityTargets* targets);
 
 }  // namespace regrade

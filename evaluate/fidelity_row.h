@@ -34,13 +34,6 @@ struct FidelityRow {
 
   // Mean over frames of the SSIM of edge maps with the unstyled frame's, see EQ(ssim).
   std::optional<double> edge_ssim;
-
-  // Distances to the style picture by networks: see StyleDistances.
-  std::optional<double> gram_to_style, frechet_to_style, embedding_to_style;
-
-  // Mean over frames of the perceptual distance to the unstyled frame, and with it and
-  // frechet_to_style ArtFidLike.
-  std::optional<double> lpips_to_unstyled, artfid_like;
 };
 
 }  // namespace regrade

@@ -21,8 +21,7 @@ std::vector<float> ValuesOf(const Image& image, bool as_given) {
 
 }  // namespace
 
-std::vector<OnnxArray> OnnxRunner::Run(const Inputs& inputs, bool as_given,
-                                       const std::vector<std::string>& outputs) const {
+OnnxArray OnnxRunner::Run(const Inputs& inputs, bool as_given) const {
   std::vector<std::vector<float>> values;
   std::vector<OnnxModel::Input> arrays;
   for (const auto& [name, picture] : inputs) {
@@ -31,15 +30,7 @@ std::vector<OnnxArray> OnnxRunner::Run(const Inputs& inputs, bool as_given,
     values.push_back(ValuesOf(*picture, as_given));
     arrays.push_back({name, {1, 3, picture->height, picture->width}, values.back().data()});
   }
-  return model_.Run(arrays, outputs, expected_);
-}
-
-OnnxArray OnnxRunner::Run(const Inputs& inputs, bool as_given) const {
-  return std::move(Run(inputs, as_given, {}).front());
-}
-
-std::vector<OnnxArray> OnnxRunner::RunAll(const Inputs& inputs) const {
-  return Run(inputs, /*as_given=*/false, model_.OutputNames());
+  return std::move(model_.Run(arrays, {}, expected_).front());
 }
 
 }  // namespace regrade

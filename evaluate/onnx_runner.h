@@ -23,17 +23,12 @@ class OnnxRunner {
   // network's first.
   using Inputs = std::vector<std::pair<std::string, const Image*>>;
   OnnxArray Run(const Inputs& inputs, bool as_given = false) const;
-  // Every output that feeds no other operator, in the order of the file.
-  std::vector<OnnxArray> RunAll(const Inputs& inputs) const;
 
   [[noreturn]] void Refuse(const std::string& what, const std::string& hint) const {
     model_.Refuse(what, hint);
   }
 
  private:
-  std::vector<OnnxArray> Run(const Inputs& inputs, bool as_given,
-                             const std::vector<std::string>& outputs) const;
-
   OnnxModel model_;
   std::string expected_;
 };

@@ -139,12 +139,7 @@ constexpr FidelityColumn kColumns[] = {
 constexpr FidelityColumn kOptionalColumns[] = {
     {"LPIPS to 2D", &FidelityRow::lpips_to_2d, 4},
     {"structure", &FidelityRow::structure, 3},
-    {"edge SSIM", &FidelityRow::edge_ssim, 4},
-    {"Gram to style", &FidelityRow::gram_to_style, 6},
-    {"Frechet to style", &FidelityRow::frechet_to_style, 4},
-    {"embedding to style", &FidelityRow::embedding_to_style, 4},
-    {"LPIPS to unstyled", &FidelityRow::lpips_to_unstyled, 4},
-    {"like ArtFID", &FidelityRow::artfid_like, 4}};
+    {"edge SSIM", &FidelityRow::edge_ssim, 4}};
 
 std::string FidelityTable(const ConsistencyReport& consistency,
                           const std::vector<FidelityRow>& fidelity,

@@ -131,12 +131,6 @@ std::vector<OnnxArray> OnnxModel::Run(const std::vector<Input>& inputs,
   return arrays;
 }
 
-std::vector<std::string> OnnxModel::OutputNames() const {
-  const std::lock_guard lock(implementation_->mutex);
-  const std::vector<cv::String> names = implementation_->net.getUnconnectedOutLayersNames();
-  return {names.begin(), names.end()};
-}
-
 void OnnxModel::GiveBackMemory() const {
   const std::lock_guard lock(implementation_->mutex);
   implementation_->Load();

@@ -33,8 +33,6 @@ class OnnxModel {
   std::vector<OnnxArray> Run(const std::vector<Input>& inputs,
                              const std::vector<std::string>& outputs,
                              const std::string& expected) const;
-  // Of the outputs that feed no other operator, in the order of the file.
-  std::vector<std::string> OutputNames() const;
 
   // Gives back the memory that Run keeps for the sizes it has seen, which is several times what
   // comes out; costs reading the network anew, from memory.

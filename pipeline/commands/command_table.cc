@@ -38,8 +38,8 @@ const std::vector<Command>& AllCommands() {
        "dry-run verbose"},
       {"mix", "DIR [NAME|STYLED.npz ...] --out FOLDER [OPTIONS]",
        "makes a film that blends from the unstyled scene into one or more styles", RunMix},
-      {"contact-sheet", "DIR [NAME...] | DIR PICTURE... --out FILE.png [OPTIONS]",
-       "makes one picture that compares a folder's styles, or styling methods",
+      {"contact-sheet", "DIR [NAME...] --out FILE.png [OPTIONS]",
+       "makes one picture that compares the styles of a folder",
        RunContactSheet},
       {"evaluate",
        "DIR [OPTIONS] | --frames DIR [DIR ...] [--label TEXT ...] [--reference DIR] "

@@ -55,9 +55,7 @@ void EvaluatePairs(const FramesOptions& frames, const ConsistencyOptions& option
                                     {"--depth", frames.depth},
                                     {"--require", frames.require},
                                     {"--junit", frames.junit},
-                                    {"--edges", options.edges},
-                                    {"--style-features", options.style_features},
-                                    {"--style-embedding", options.style_embedding}})
+                                    {"--edges", options.edges}})
     if (!value.empty())
       throw UsageError("pictures of PST50 are compared with its ground truth only", flag,
                        "leave it out");

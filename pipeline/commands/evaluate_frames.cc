@@ -44,10 +44,6 @@ void CheckTogether(const FramesOptions& frames, const ConsistencyOptions& option
   if (options.control_field)
     throw UsageError("a field is fitted for runs of regrade only", "--control-field",
                      "leave it out, or evaluate the folder of a run");
-  for (const auto& [flag, network] : {std::pair{"--style-features", options.style_features},
-                                      {"--style-embedding", options.style_embedding}})
-    if (!network.empty() && frames.style.empty())
-      throw UsageError("distances to a style need its picture", flag, "add --style");
   if (!options.edges.empty() && frames.reference.empty())
     throw UsageError("edges are compared with the unstyled frames'", "--edges",
                      "add --reference");

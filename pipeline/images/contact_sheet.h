@@ -13,14 +13,9 @@ struct SheetCell {
   std::string caption;
 };
 
-struct SheetRow {
-  std::string title;  // of the block that begins with this row; empty: the last block goes on
-  std::vector<SheetCell> cells;
-};
+using SheetRow = std::vector<SheetCell>;
 
-// All cells are as wide as the widest picture; a row is as high as its highest one. `columns`:
-// headings above the cells of each block.
-Image MakeContactSheet(const std::vector<std::string>& columns,
-                       const std::vector<SheetRow>& rows);
+// All cells are as wide as the widest picture; a row is as high as its highest one.
+Image MakeContactSheet(const std::vector<SheetRow>& rows);
 
 }  // namespace regrade

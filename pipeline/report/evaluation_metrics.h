@@ -91,9 +91,7 @@ struct FidelityMetrics {
   Metric hue_std, hue_std_2d;         // radians
   Metric chroma, chroma_2d;           // CIELAB
   Metric sliced_wasserstein_to_style;
-  // Where --edges or a network was given; see FidelityRow.
-  std::optional<double> edge_ssim, gram_to_style, frechet_to_style, embedding_to_style,
-      lpips_to_unstyled, artfid_like;
+  std::optional<double> edge_ssim;  // where --edges was given
 
   template <typename Visit>
   void Describe(Visit& visit) {
@@ -107,11 +105,6 @@ struct FidelityMetrics {
     visit("chroma_2d", chroma_2d);
     visit("sliced_wasserstein_to_style", sliced_wasserstein_to_style);
     visit("edge_ssim", edge_ssim);
-    visit("gram_to_style", gram_to_style);
-    visit("frechet_to_style", frechet_to_style);
-    visit("embedding_to_style", embedding_to_style);
-    visit("lpips_to_unstyled", lpips_to_unstyled);
-    visit("artfid_like", artfid_like);
   }
 };
 

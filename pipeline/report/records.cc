@@ -98,11 +98,6 @@ FidelityMetrics MetricsOfFidelity(const FidelityRow& row) {
   metrics.chroma_2d = Metric(row.chroma_2d);
   metrics.sliced_wasserstein_to_style = Metric(row.sliced_wasserstein_to_style);
   metrics.edge_ssim = row.edge_ssim;
-  metrics.gram_to_style = row.gram_to_style;
-  metrics.frechet_to_style = row.frechet_to_style;
-  metrics.embedding_to_style = row.embedding_to_style;
-  metrics.lpips_to_unstyled = row.lpips_to_unstyled;
-  metrics.artfid_like = row.artfid_like;
   return metrics;
 }
 

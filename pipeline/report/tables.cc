@@ -141,12 +141,7 @@ std::string ConsistencyHtml(const RunReport& report) {
           to_2d += "<br>structure " + MetricHtml(*fidelity->structure, 3);
         if (fidelity->edge_ssim)
           to_2d += "<br>edge SSIM " + MetricHtml(*fidelity->edge_ssim, 3);
-        std::string to_style = MetricHtml(fidelity->sliced_wasserstein_to_style, 4);
-        for (const auto& [name, value] : {std::pair{"Gram", fidelity->gram_to_style},
-                                          {"Fréchet", fidelity->frechet_to_style},
-                                          {"embedding", fidelity->embedding_to_style},
-                                          {"like ArtFID", fidelity->artfid_like}})
-          if (value) to_style += "<br>" + std::string(name) + " " + MetricHtml(*value, 4);
+        const std::string to_style = MetricHtml(fidelity->sliced_wasserstein_to_style, 4);
         body += SpanningCell(to_2d, n, "n divider") +
                 SpanningCell(WithTarget(fidelity->hue_std, fidelity->hue_std_2d, 3), n, "n") +
                 SpanningCell(WithTarget(fidelity->chroma, fidelity->chroma_2d, 1), n, "n") +

@@ -15,8 +15,7 @@
 namespace regrade {
 namespace {
 
-constexpr char kStyle[] = "style", kPair[] = "pair", kFeatures[] = "features",
-               kEmbedding[] = "embedding", kEdges[] = "edges", kRegions[] = "regions";
+constexpr char kStyle[] = "style", kPair[] = "pair", kEdges[] = "edges", kRegions[] = "regions";
 
 void OpenStyleNetwork(const std::string& path) { MakeOnnxStylizer(path, 64, Image(64, 64)); }
 
@@ -31,9 +30,9 @@ void ProbePairNetwork(const std::string& path) {
   const PairNetwork opened(path);
 }
 
-void ProbeImageNetwork(const char* kind, const std::string& path) {
+void ProbeEdgeNetwork(const std::string& path) {
   if (path.empty()) return;
-  RunCrashProbe(kind, path);
+  RunCrashProbe(kEdges, path);
   const ImageNetwork opened(path);
 }
 
@@ -53,9 +52,7 @@ void ProbeEvaluationNetworks(const ConsistencyOptions& options) {
   constexpr char kOnnx[] = "onnx:";
   if (options.flow.starts_with(kOnnx)) ProbePairNetwork(options.flow.substr(sizeof(kOnnx) - 1));
   if (!options.lpips.empty()) ProbePairNetwork(options.lpips);
-  if (options.edges != kGradientEdges) ProbeImageNetwork(kEdges, options.edges);
-  ProbeImageNetwork(kFeatures, options.style_features);
-  ProbeImageNetwork(kEmbedding, options.style_embedding);
+  if (options.edges != kGradientEdges) ProbeEdgeNetwork(options.edges);
 }
 
 void RunNetworkProbe(const std::vector<std::string>& arguments) {
@@ -69,8 +66,6 @@ void RunNetworkProbe(const std::vector<std::string>& arguments) {
     if (kind == kStyle) return OpenStyleNetwork(path);
     if (kind == kRegions) return OpenFeatureNetwork(path);
     const Image picture(64, 64, 3);
-    if (kind == kFeatures) return (void)ImageNetwork(path).Features(picture);
-    if (kind == kEmbedding) return (void)ImageNetwork(path).Embedding(picture);
     if (kind == kEdges) return (void)ImageNetwork(path).EdgeMap(picture);
     if (kind == kPair) {
       PairNetwork(path).Distance(picture, picture);

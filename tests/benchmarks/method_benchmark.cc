@@ -144,11 +144,10 @@ int Main(const std::vector<std::string>& words) {
                                        static_cast<int>(photo.height * scale)));
     }
   }
-  std::vector<std::string> columns{"photo"};
   std::vector<SheetRow> rows;
   for (const std::vector<Image>& photos : captures)
     for (size_t s = 0; s < styles.size(); ++s)
-      rows.push_back({"", {{photos[photos.size() / 2], ""}}});
+      rows.push_back({{photos[photos.size() / 2], "photo"}});
   std::printf(
       "| method | distance to the style | structure | TC, dB | slope | s a picture |\n");
   std::printf("|---|---|---|---|---|---|\n");
@@ -164,18 +163,18 @@ int Main(const std::vector<std::string>& words) {
       if (name == "onnx" && scene_wide) continue;
       options.scene_wide = scene_wide;
       Row row;
-      columns.push_back(name + (scene_wide ? " scene-wide" : ""));
+      const std::string caption = name + (scene_wide ? " scene-wide" : "");
       size_t at = 0;
       for (const std::vector<Image>& photos : captures)
         for (const Image& style : styles)
-          rows[at++].cells.push_back({Measure(options, style, photos, &row), ""});
+          rows[at++].push_back({Measure(options, style, photos, &row), caption});
       std::printf("| `%s`%s | %s | %s | %s | %s | %s |\n", name.c_str(),
                   scene_wide ? " scene-wide" : "", Cell(row.distance, 3, false).c_str(),
                   Cell(row.structure, 3, true).c_str(), Cell(row.consistency, 2, true).c_str(),
                   Cell(row.slope, 1, false).c_str(), Cell(row.seconds, 3, false).c_str());
       std::fflush(stdout);
     }
-  if (words.at(3) != "-") WritePng8(words.at(3), MakeContactSheet(columns, rows));
+  if (words.at(3) != "-") WritePng8(words.at(3), MakeContactSheet(rows));
   return 0;
 }
 

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Measures the distances of frames to a style picture and to the unstyled frames in numpy, as an independent check of
+"""Measures the distances of frames to a style picture and to other frames in numpy, as an independent check of
 `regrade evaluate`; shares no code with the program.
 
   reference_fidelity.py --frames DIR --reference DIR --style FILE --weights FILE.npz
@@ -15,8 +15,6 @@ import sys
 
 import numpy
 from reference_evaluator import read_frame, read_frames
-
-SIDE = 224  # of a picture whose embedding is made
 
 
 def network_input(picture):
@@ -35,49 +33,6 @@ def lpips_like(w, a, b):
         f = numpy.maximum(conv(w["lpips"], w["lpips_bias"], network_input(picture)), 0)
         return f / (numpy.sqrt((f ** 2).sum(axis=0, keepdims=True)) + 1e-3)
     return float(numpy.einsum("c,chw->hw", w["heads"], (unit(a) - unit(b)) ** 2).mean())
-
-
-def features(w, picture):
-    """Of each output [channels, positions]."""
-    x = network_input(picture)
-    return [numpy.maximum(conv(w[name], w[name + "_bias"], x), 0).reshape(len(w[name]), -1) for name in ("first", "second")]
-
-
-def gram_distance(a, b):
-    difference = a @ a.T / a.shape[1] - b @ b.T / b.shape[1]
-    return (difference ** 2).sum() / (4 * len(a) ** 2)
-
-
-def frechet_distance(a, b):
-    mean_a, mean_b = a.mean(axis=1), b.mean(axis=1)
-    of_a, of_b = numpy.cov(a, bias=True), numpy.cov(b, bias=True)
-    roots = numpy.sqrt(numpy.maximum(numpy.linalg.eigvals(of_a @ of_b).real, 0)).sum()
-    return ((mean_a - mean_b) ** 2).sum() + numpy.trace(of_a) + numpy.trace(of_b) - 2 * roots
-
-
-def area_weights(size, new):
-    """[new, size]: each new pixel is the mean of the part that it covers; for shrinking."""
-    edges = numpy.arange(new + 1) * size / new
-    pixels = numpy.arange(size)
-    covered = numpy.minimum(edges[1:, None], pixels + 1) - numpy.maximum(edges[:-1, None], pixels)
-    covered = numpy.maximum(covered, 0)
-    return covered / covered.sum(axis=1, keepdims=True)
-
-
-def linear_weights(size, new):
-    """[new, size]: bilinear between centres, edges repeated; for enlarging."""
-    at = numpy.clip((numpy.arange(new) + 0.5) * size / new - 0.5, 0, size - 1)
-    return numpy.maximum(0, 1 - numpy.abs(at[:, None] - numpy.arange(size)))
-
-
-def embedding(w, picture):
-    rows, columns = ((area_weights if size > SIDE else linear_weights)(size, SIDE) for size in picture.shape[:2])
-    square = numpy.einsum("xw,ywc->yxc", columns, numpy.einsum("yh,hwc->ywc", rows, picture))
-    return numpy.maximum(conv(w["vector"], w["vector_bias"], network_input(square)), 0).mean(axis=(1, 2))
-
-
-def cosine_distance(a, b):
-    return 1 - a @ b / math.sqrt(a @ a * (b @ b))
 
 
 def gradient_edges(picture):
@@ -129,16 +84,8 @@ def sliced_wasserstein(frames, style):
 
 
 def measure(frames, reference, style, w):
-    of_style, vector = features(w, style), embedding(w, style)
-    of_frames = [features(w, frame) for frame in frames]
-    frechet = sum(frechet_distance(numpy.concatenate([f[k] for f in of_frames], axis=1), of_style[k]) for k in range(2))
-    lpips = numpy.mean([lpips_like(w, a, b) for a, b in zip(frames, reference)])
     return {
-        "gram_to_style": numpy.mean([sum(gram_distance(f[k], of_style[k]) for k in range(2)) for f in of_frames]),
-        "frechet_to_style": frechet,
-        "embedding_to_style": numpy.mean([cosine_distance(embedding(w, frame), vector) for frame in frames]),
-        "lpips_to_unstyled": lpips,
-        "artfid_like": (1 + lpips) * (1 + frechet),
+        "lpips_to_2d": numpy.mean([lpips_like(w, a, b) for a, b in zip(frames, reference)]),
         "sliced_wasserstein_to_style": sliced_wasserstein(frames, style),
         "edge_ssim": numpy.mean([ssim(gradient_edges(a), gradient_edges(b)) for a, b in zip(frames, reference)]),
         "edge_ssim_by_network": numpy.mean([ssim(network_edges(w, a), network_edges(w, b)) for a, b in zip(frames, reference)]),

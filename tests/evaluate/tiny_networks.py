@@ -62,9 +62,9 @@ class Network:
 
 
 def write_networks(folder, random):
-    """lpips.onnx, features.onnx, vector.onnx, edges.onnx and weights.npz."""
+    """lpips.onnx, edges.onnx and weights.npz."""
     w = {}
-    for name, channels in (("lpips", 8), ("first", 6), ("second", 4), ("vector", 5), ("edges", 1)):
+    for name, channels in (("lpips", 8), ("edges", 1)):
         w[name] = random.standard_normal((channels, 3)).astype("f4")
         w[name + "_bias"] = (0.3 * random.standard_normal(channels)).astype("f4")
     w["heads"] = random.random(8).astype("f4")
@@ -83,18 +83,6 @@ def write_networks(folder, random):
     lpips.node("GlobalAveragePool", ["weighted"], "distance")
     lpips.output("distance", 1)
     lpips.write(at("lpips"))
-
-    features = Network("picture")
-    for name in ("first", "second"):
-        features.node("Relu", [features.conv("picture", w[name], w[name + "_bias"], name + "_c")], name)
-        features.output(name, len(w[name]))
-    features.write(at("features"))
-
-    vector = Network("picture")
-    vector.node("Relu", [vector.conv("picture", w["vector"], w["vector_bias"], "c")], "f")
-    vector.node("GlobalAveragePool", ["f"], "embedding")
-    vector.output("embedding", 5)
-    vector.write(at("vector"))
 
     edges = Network("picture")
     edges.node("Sigmoid", [edges.conv("picture", w["edges"], w["edges_bias"], "c")], "map")

@@ -59,15 +59,13 @@ TEST(ForeignFolder, WhatItNamesOutsideIsAskedFor) {
                                                     {"flow", "onnx:/x.onnx"},
                                                     {"lpips", "/x.onnx"},
                                                     {"edges", "/x.onnx"},
-                                                    {"style-features", "/x.onnx"},
-                                                    {"style-embedding", "/x.onnx"},
                                                     {"match-network", "/x.onnx"},
                                                     {"masks", "/elsewhere"},
                                                     {"style-mask", folder / "e/mask.png"},
                                                     {"residual", "layers:" + (folder / "x")},
                                                     {"style-steps", 7}});
   const Resolved refused = Continue(folder, {}, false);
-  EXPECT_EQ(refused.asked.size(), 9u);
+  EXPECT_EQ(refused.asked.size(), 7u);
   EXPECT_EQ(refused.settings.style_2d.method, "mkl");
   EXPECT_EQ(refused.settings.consistency.flow, ConsistencyOptions().flow);
   EXPECT_EQ(refused.settings.consistency.lpips, "");

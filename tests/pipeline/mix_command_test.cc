@@ -125,25 +125,9 @@ TEST(MixCommand, H49_AFilmBetweenTheSceneAndItsStyle) {
   EXPECT_EQ(Regrade({"mix", folder / "e", "--dry-run"}).code, 0);
   EXPECT_FALSE(std::filesystem::exists(folder / "x"));
 
-  const ProgramOutcome sheet =
-      Regrade({"contact-sheet", folder / "e", style, "--out", folder / "sheet.png", "--size",
-               "64", "--steps", "2", "--views", "1"});
-  EXPECT_EQ(sheet.code, 0) << sheet.text;
-  EXPECT_GT(frame("sheet.png").size(), 10000u);
-  // A sixth column: a field fitted to the 2D method's pictures.
-  const ProgramOutcome wider =
-      Regrade({"contact-sheet", folder / "e", style, "--out", folder / "wider.png", "--size",
-               "64", "--steps", "2", "--views", "1", "--control-field"});
-  ASSERT_EQ(wider.code, 0) << wider.text;
-  const Image narrow = ReadImage(folder / "sheet.png"), wide = ReadImage(folder / "wider.png");
-  EXPECT_EQ(wide.height, narrow.height);
-  EXPECT_GT(wide.width, narrow.width + 60);
-  // Without a picture it shows the styles that are there.
   EXPECT_EQ(Regrade({"contact-sheet", folder / "e", "--out", folder / "y.png"}).code, 0);
   EXPECT_GT(frame("y.png").size(), 10000u);
-  EXPECT_EQ(
-      Regrade({"contact-sheet", folder / "e", folder / "no.jpg", "--out", folder / "y"}).code,
-      3);
+  EXPECT_EQ(Regrade({"contact-sheet", folder / "e", "none", "--out", folder / "y"}).code, 3);
 }
 
 }  // namespace

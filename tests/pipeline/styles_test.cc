@@ -124,10 +124,6 @@ TEST(Styles, EachHasItsFolderAndNothingIsOverwritten) {
   EXPECT_EQ(Regrade({"export", folder / "e", "--format", "ply", "--out", folder / "y"}).code,
             0);
   fs::remove_all(folder / "e/styles/begun");
-  EXPECT_EQ(Regrade({"contact-sheet", folder / "e", "style_night", Asset("sunset"), "--out",
-                     folder / "x.png"})
-                .code,
-            2);
   done = Regrade({"render", folder / "e", "--name", "none"});
   EXPECT_EQ(done.code, 3);
   EXPECT_NE(done.text.find("style_night, style_night-2, style_sunset"), std::string::npos)

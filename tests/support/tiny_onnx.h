@@ -40,21 +40,8 @@ inline void PixelConv(TinyOnnx* network, const std::string& input, const std::st
                 TinyOnnx::Integers("kernel_shape", {1, 1}));
 }
 
-// Pictures of any size: two outputs, (r, g - b) and (2 r); a third one, which the second is
-// made of, is no last output.
-inline std::string FeatureNetwork() {
-  TinyOnnx network;
-  network.Input("picture", 3);
-  PixelConv(&network, "picture", "first", {1, 0, 0, 0, 1, -1});
-  PixelConv(&network, "picture", "inner", {1, 0, 0, 0, 1, 0, 0, 0, 1});
-  PixelConv(&network, "inner", "second", {2, 0, 0});
-  network.Output("first", 2);
-  network.Output("second", 1);
-  return network.Bytes();
-}
-
 // The mean colour.
-inline std::string EmbeddingNetwork() {
+inline std::string MeanNetwork() {
   TinyOnnx network;
   network.Input("picture", 3);
   network.Node("GlobalAveragePool", {"picture"}, "vector");
