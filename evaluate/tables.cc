@@ -136,10 +136,9 @@ constexpr FidelityColumn kColumns[] = {
     {"chroma", &FidelityRow::chroma, 2},
     {"of 2D", &FidelityRow::chroma_2d, 2},
     {"SW to style", &FidelityRow::sliced_wasserstein_to_style, 4}};
-constexpr FidelityColumn kOptionalColumns[] = {
-    {"LPIPS to 2D", &FidelityRow::lpips_to_2d, 4},
-    {"structure", &FidelityRow::structure, 3},
-    {"edge SSIM", &FidelityRow::edge_ssim, 4}};
+constexpr FidelityColumn kOptionalColumns[] = {{"LPIPS to 2D", &FidelityRow::lpips_to_2d, 4},
+                                               {"structure", &FidelityRow::structure, 3},
+                                               {"edge SSIM", &FidelityRow::edge_ssim, 4}};
 
 std::string FidelityTable(const ConsistencyReport& consistency,
                           const std::vector<FidelityRow>& fidelity,

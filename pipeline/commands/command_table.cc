@@ -39,8 +39,7 @@ const std::vector<Command>& AllCommands() {
       {"mix", "DIR [NAME|STYLED.npz ...] --out FOLDER [OPTIONS]",
        "makes a film that blends from the unstyled scene into one or more styles", RunMix},
       {"contact-sheet", "DIR [NAME...] --out FILE.png [OPTIONS]",
-       "makes one picture that compares the styles of a folder",
-       RunContactSheet},
+       "makes one picture that compares the styles of a folder", RunContactSheet},
       {"evaluate",
        "DIR [OPTIONS] | --frames DIR [DIR ...] [--label TEXT ...] [--reference DIR] "
        "[--target DIR] [--style PICTURE] | --splats FILE [FILE ...] --reference FILE "

@@ -44,8 +44,7 @@ std::vector<SheetRow> RowsOfStyles(const WorkingViews& views, const std::vector<
     const StoredField styled = ReadStyledField(folder, StyleFolder(folder, name));
     const FieldRenderer renderer(styled.field, Backend::kCpu);
     for (size_t k = 0; k < rows.size(); ++k)
-      rows[k].push_back(
-          {Clipped(renderer.Render(views.CameraOf(shown[k])).color), name});
+      rows[k].push_back({Clipped(renderer.Render(views.CameraOf(shown[k])).color), name});
   }
   return rows;
 }
@@ -73,8 +72,8 @@ void RunContactSheet(const Command& command, const Arguments& arguments, Console
   options.Add("Sheet", &sheet);
   options.Add("Program", &program);
   constexpr size_t kMostStyles = 64;
-  const auto prepared = Prepare(command, arguments,
-                                {.least_words = 1, .most_words = 1 + kMostStyles}, &options);
+  const auto prepared =
+      Prepare(command, arguments, {.least_words = 1, .most_words = 1 + kMostStyles}, &options);
   if (!prepared) return;
   const std::string& folder = prepared->words[0];
   if (!fs::exists(folder + "/field.npz"))

@@ -28,8 +28,8 @@ struct Networks {
 TEST(ImageNetwork, RefusalsNameTheFile) {
   const Networks networks;
   const Image picture = ConstantImage(16, 12, 0.5f);
-  EXPECT_REGRADE_ERROR(ImageNetwork(networks.mean).EdgeMap(picture),
-                       ExitCode::kExternalProgram, "mean.onnx");
+  EXPECT_REGRADE_ERROR(ImageNetwork(networks.mean).EdgeMap(picture), ExitCode::kExternalProgram,
+                       "mean.onnx");
   EXPECT_REGRADE_ERROR(ImageNetwork(networks.edges + "x"), ExitCode::kExternalProgram,
                        "there is no such file");
 }

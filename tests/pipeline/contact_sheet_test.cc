@@ -28,7 +28,7 @@ TEST(ContactSheet, EveryPictureIsThereWhole) {
   EXPECT_GE(quarter, 40 * 30);
   EXPECT_GE(half, 30 * 30);
   EXPECT_GE(three, 40 * 20);
-  EXPECT_LE(quarter, 40 * 30 + 100);  // only edges of letters may be in it
+  EXPECT_LE(quarter, 40 * 30 + 100);                 // only edges of letters may be in it
   EXPECT_GT(ink, 40 * 30 + 30 * 30 + 40 * 20 + 20);  // the captions, too
   EXPECT_GT(sheet.width, 80);
   EXPECT_EQ(MakeContactSheet({}).channels, 3);

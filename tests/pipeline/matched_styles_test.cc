@@ -95,9 +95,8 @@ TEST(MatchedStyles, EachRegionTakesItsPictureAndTheStyleIsLikeAnyOther) {
   EXPECT_EQ(outcome.code, 0) << outcome.text;
   outcome = Regrade({"mix", folder / "out", "sky-wall", "--mix", "0.5", "--out", folder / "m"});
   EXPECT_EQ(outcome.code, 0) << outcome.text;
-  outcome =
-      Regrade({"contact-sheet", folder / "out", "sky-wall", "--size", "64", "--views", "1",
-               "--out", folder / "c.png"});
+  outcome = Regrade({"contact-sheet", folder / "out", "sky-wall", "--size", "64", "--views",
+                     "1", "--out", folder / "c.png"});
   EXPECT_EQ(outcome.code, 0) << outcome.text;
   EXPECT_TRUE(fs::exists(folder / "c.png"));
 

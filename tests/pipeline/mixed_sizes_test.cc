@@ -152,8 +152,8 @@ TEST(MixedSizes, H159_ThreeSizesOfTwoCamerasGoToFilmAndReport) {
   ASSERT_EQ(mix.code, 0) << mix.text;
   EXPECT_EQ(SizeOf(folder / "m/frames/00001.png"), "48x64");
   EXPECT_EQ(CountVideoFrames(folder / "m/mixed.mp4"), 6);
-  const ProgramOutcome sheet = Regrade(
-      {"contact-sheet", folder / "e", "--out", folder / "sheet.png", "--size", "64"});
+  const ProgramOutcome sheet =
+      Regrade({"contact-sheet", folder / "e", "--out", folder / "sheet.png", "--size", "64"});
   EXPECT_EQ(sheet.code, 0) << sheet.text;
 
   // Frames of another program that differ in size are a mistake.
