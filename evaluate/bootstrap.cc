@@ -8,7 +8,7 @@
 namespace regrade {
 namespace {
 
-double Quantile(const std::vector<double>& sorted, double fraction) {
+double InterpolatedQuantile(const std::vector<double>& sorted, double fraction) {
   const double at = fraction * static_cast<double>(sorted.size() - 1);
   const size_t below = static_cast<size_t>(at);
   const size_t above = std::min(below + 1, sorted.size() - 1);
@@ -36,7 +36,7 @@ std::optional<Interval> BootstrapMean(const std::vector<double>& values, int blo
   for (size_t r = 0; r < means.size(); ++r)
     means[r] = MeanOfResample(values, static_cast<size_t>(block), seed, r);
   std::ranges::sort(means);
-  return Interval{Quantile(means, 0.025), Quantile(means, 0.975)};
+  return Interval{InterpolatedQuantile(means, 0.025), InterpolatedQuantile(means, 0.975)};
 }
 
 }  // namespace regrade

@@ -80,7 +80,7 @@ TEST(ForeignFolder, WhatItNamesOutsideIsAskedFor) {
   const Resolved given = Continue(
       folder, {"--method", "command:mine {input} {output}", "--config", folder / "mine.json"},
       false);
-  EXPECT_EQ(given.asked.size(), 7u);
+  EXPECT_EQ(given.asked.size(), 5u);
   EXPECT_EQ(given.settings.style_2d.method, "command:mine {input} {output}");
   EXPECT_EQ(given.settings.consistency.lpips, "/mine.onnx");
 }

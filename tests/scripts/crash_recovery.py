@@ -230,7 +230,7 @@ class Supervisor:
             if status != 0:
                 sys.exit(f"regrade refine: {error}")
             self.duration["refine"] = time.monotonic() - begin
-        for _ in range(3):
+        for _ in range(5):  # turns of three blocks, with last ones
             self.kill_parts([self.regrade, "refine", self.work, *refine], 2, 0.5 * self.duration["refine"], "a block")
         status, error = call([self.regrade, "refine", self.work, *refine, "--join"])
         if status != 0:
