@@ -4,7 +4,8 @@
 //   inputs.json  see SharedWork
 //   coarse.npz   the field that is refined
 //   plan.json    see PlanBlocks; of whoever came first, and the same for all
-//   00001.npz    splats of block 1 of 1, 2, ..., those that it keeps; a field file
+//   00001.npz    splats of the plan's entry 1, 2, ..., those that it keeps; a field file. Last
+//                turns are entries behind the blocks
 //   00001.json   BlockRecord of it, which is written last
 #pragma once
 

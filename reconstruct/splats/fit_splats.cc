@@ -152,10 +152,11 @@ class SplatFitter {
     SplatUpdate& update = step.update;
     const float part = static_cast<float>(step_) / Steps();
     step.depth_weight = options_.depth_weight * std::pow(kDepthFall, part);
-    const float rate = options_.rate_mean *
+    const float warm = WarmUp();
+    const float rate = warm * options_.rate_mean *
                        std::pow(options_.rate_mean_end / options_.rate_mean, part) * extent_;
-    const float fall =
-        is_long() ? std::pow(options_.fall, std::max(0.0f, 2 * part - 1)) : 1.0f;  // of rates
+    const float fall =  // of rates
+        warm * (is_long() ? std::pow(options_.fall, std::max(0.0f, 2 * part - 1)) : 1.0f);
     update.rates = {rate,
                     options_.rate_scale * fall,
                     options_.rate_quaternion * fall,
@@ -179,6 +180,15 @@ class SplatFitter {
     engine_->Step(step);
     ++step_;
     if (step_ % kWindow == 0) CloseWindow();
+  }
+
+  // Adam's first steps are of full size in every direction: in a refinement that leaves most of
+  // its steps out, rates rise during the first quarter of those that are left.
+  float WarmUp() const {
+    const float rise = 0.25f * static_cast<float>(options_.steps - first_step_);
+    return first_step_ == 0
+               ? 1.0f
+               : std::min(1.0f, static_cast<float>(step_ - first_step_ + 1) / rise);
   }
 
   int StepsBetweenChanges() const {
