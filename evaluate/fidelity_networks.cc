@@ -1,6 +1,6 @@
 #include "evaluate/fidelity_networks.h"
 
-#include "evaluate/image_network.h"
+#include "evaluate/edge_network.h"
 #include "evaluate/pair_network.h"
 
 namespace regrade {

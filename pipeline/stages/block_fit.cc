@@ -126,7 +126,7 @@ void FitBlock(const RunContext& context, const WorkingViews& views, const Stored
   options.steps = std::max(1, static_cast<int>(std::lround(options.steps * part_of_photos)));
   options.thousands *= static_cast<float>(space.share);
   options.seed = settings.run.seed + static_cast<uint64_t>(block);
-  if (space.first >= 0) options.begin = kLastTurnBegin;
+  if (space.repeats >= 0) options.begin = kLastTurnBegin;
   // The process has the field twice besides: each is a sixth of what a fit has of a splat.
   const int64_t copies = backend == Backend::kCpu ? splats.count / 3 : 0;
   const FitPlace place{.backend = backend,

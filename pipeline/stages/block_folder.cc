@@ -110,7 +110,7 @@ void BlockFolder::Begin() const {
 std::optional<BlockPlan> BlockFolder::Plan() const {
   if (!fs::exists(Path(kPlan))) return std::nullopt;
   BlockPlan plan = PlanFromJson(ReadJsonFile(Path(kPlan)));
-  if (std::ranges::count(plan.blocks, -1, &SpaceBlock::first) != blocks_)
+  if (std::ranges::count(plan.blocks, -1, &SpaceBlock::repeats) != blocks_)
     throw InputError("is not a plan of " + Counted(blocks_, "block"), Path(kPlan),
                      "remove this folder");
   return plan;
@@ -147,8 +147,9 @@ void RepairField(const RunContext& context) {
 }
 
 std::string BlockName(const BlockPlan& plan, int block) {
-  const int first = plan.blocks[static_cast<size_t>(block)].first;
-  return first < 0 ? Concat("block ", block + 1) : Concat("last turn of block ", first + 1);
+  const int repeats = plan.blocks[static_cast<size_t>(block)].repeats;
+  return repeats < 0 ? Concat("block ", block + 1)
+                     : Concat("last turn of block ", repeats + 1);
 }
 
 std::string BlocksText(const std::vector<int>& blocks, int all, const char* verb_of_one,

@@ -4,8 +4,8 @@
 //   inputs.json  see SharedWork
 //   coarse.npz   the field that is refined
 //   plan.json    see PlanBlocks; of whoever came first, and the same for all
-//   00001.npz    splats of the plan's entry 1, 2, ..., those that it keeps; a field file. Last
-//                turns are entries behind the blocks
+//   00001.npz    field file of the splats that the plan's entry 1, 2, ... keeps: the blocks,
+//                then their last turns
 //   00001.json   BlockRecord of it, which is written last
 #pragma once
 
@@ -55,7 +55,7 @@ class BlockFolder {
   bool IsJoined() const { return joined_; }
   const std::string& path() const { return work_->path(); }
   int blocks() const { return blocks_; }
-  // How many: as the plan's entries, and before there is a plan as blocks.
+  // The number of entries of the plan; while there is none, the number of blocks.
   int fits() const;
   std::string Path(const std::string& name) const { return work_->Path(name); }
   std::string OtherSettings() const { return work_->OtherSettings(); }

@@ -29,6 +29,8 @@ struct Joined {
 Joined ReadBlocks(const BlockFolder& folder, const BlockPlan& plan) {
   Joined joined;
   double squared = 0, weights = 0;
+  std::set<int> fitted_again;
+  for (const SpaceBlock& block : plan.blocks) fitted_again.insert(block.repeats);
   for (int block = 0; block < std::ssize(plan.blocks); ++block) {
     const BlockRecord record = *folder.Find(block);
     const StoredField stored = ReadFieldFile(folder.FieldPath(block));
@@ -49,7 +51,7 @@ Joined ReadBlocks(const BlockFolder& folder, const BlockPlan& plan) {
     joined.sums.peak_memory_gb = std::max(joined.sums.peak_memory_gb, record.peak_memory_gb);
     joined.sums.pixels += record.pixels;
     joined.sums.rejected += record.rejected;
-    if (!record.psnr_train_db.value) continue;
+    if (!record.psnr_train_db.value || fitted_again.contains(block)) continue;
     const double weight = static_cast<double>(record.pixels);
     squared += weight * std::pow(10, -*record.psnr_train_db.value / 10);
     weights += weight;

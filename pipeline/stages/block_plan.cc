@@ -120,7 +120,7 @@ JsonValue PlanToJson(const BlockPlan& plan) {
                                   {"after", numbers(block.after)},
                                   {"turn", block.turn},
                                   {"share", block.share},
-                                  {"first", block.first},
+                                  {"repeats", block.repeats},
                                   {"views", numbers(plan.views[i])}});
   }
   return json;
@@ -138,7 +138,7 @@ BlockPlan PlanFromJson(const JsonValue& json) {
     plan.blocks.push_back(
         {HoldFromJson(value.At("owned")), HoldFromJson(value.At("held")),
          numbers(value.At("after")), static_cast<int>(value.At("turn").AsInt()),
-         value.At("share").AsDouble(), static_cast<int>(value.At("first").AsInt())});
+         value.At("share").AsDouble(), static_cast<int>(value.At("repeats").AsInt())});
     plan.views.push_back(numbers(value.At("views")));
   }
   return plan;

@@ -5,7 +5,7 @@
 #include <new>
 
 #include "evaluate/edge_map.h"
-#include "evaluate/image_network.h"
+#include "evaluate/edge_network.h"
 #include "evaluate/pair_network.h"
 #include "kernels/base/error.h"
 #include "pipeline/program/crash_probe.h"
@@ -33,7 +33,7 @@ void ProbePairNetwork(const std::string& path) {
 void ProbeEdgeNetwork(const std::string& path) {
   if (path.empty()) return;
   RunCrashProbe(kEdges, path);
-  const ImageNetwork opened(path);
+  const EdgeNetwork opened(path);
 }
 
 }  // namespace
@@ -66,7 +66,7 @@ void RunNetworkProbe(const std::vector<std::string>& arguments) {
     if (kind == kStyle) return OpenStyleNetwork(path);
     if (kind == kRegions) return OpenFeatureNetwork(path);
     const Image picture(64, 64, 3);
-    if (kind == kEdges) return (void)ImageNetwork(path).EdgeMap(picture);
+    if (kind == kEdges) return (void)EdgeNetwork(path).EdgeMap(picture);
     if (kind == kPair) {
       PairNetwork(path).Distance(picture, picture);
       return;

@@ -120,7 +120,7 @@ class Division {
     return beside;
   }
 
-  // Those that neighbours waited for, in the order of their turns.
+  // For the blocks that a neighbour waited for, in the order of their turns.
   void AddLastTurns(const std::vector<std::vector<int>>& beside) {
     const int turns = 1 + std::ranges::max(blocks_, {}, &SpaceBlock::turn).turn;
     std::vector<int> last(beside.size(), -1);
@@ -135,7 +135,7 @@ class Division {
           if (last[static_cast<size_t>(j)] >= 0)
             more.after.push_back(last[static_cast<size_t>(j)]);
         more.turn = turns + turn;
-        more.first = static_cast<int>(i);
+        more.repeats = static_cast<int>(i);
         last[i] = static_cast<int>(blocks_.size());
         blocks_.push_back(std::move(more));
       }

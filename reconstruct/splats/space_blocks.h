@@ -14,9 +14,9 @@
 // is kept, for it fits both sides of the face at once, and what is behind the rim as it is.
 // Blocks that meet in an edge or a corner alone may be fitted at the same time.
 //
-// A block of an early turn has seen its later neighbours as they were before. So it has a last
-// turn at the end, with them as they became, for the last part of its steps: an entry of its
-// own, of the same place.
+// A block of an early turn has seen its later neighbours as they were before. So it is fitted
+// again at the end, with its neighbours as they became, for the last part of its steps. This
+// last turn is an entry of its own for the same box.
 #pragma once
 
 #include <vector>
@@ -32,7 +32,7 @@ struct SpaceBlock {
   std::vector<int> after;  // neighbours that are fitted before it
   int turn = 0;            // its colour: those of earlier turns are fitted first
   double share = 0;        // of all places, those that are held
-  int first = -1;          // of a last turn: the block whose it is
+  int repeats = -1;        // in a last turn the block that is fitted again; else below 0
 };
 inline constexpr float kLastTurnBegin = 0.75f;  // part of the steps that it leaves out
 inline constexpr float kBlockRim = 0.1f;        // of the width of the narrower block at a face
@@ -43,8 +43,8 @@ bool Keeps(const std::vector<SpaceBlock>& blocks, size_t block, const float* pla
 int OwnerOf(const std::vector<SpaceBlock>& blocks, const float* place);
 
 // `places`: points in the field's frame, one for each of about equally many pixels. Each block
-// has the same number of them, up to rounding; the first `blocks` entries are they. Throws
-// Error(kUsage) where there are fewer than kLeastPlaces for a block.
+// has the same number of them, up to rounding. Last turns follow behind the `blocks` blocks.
+// Throws Error(kUsage) where there are fewer than kLeastPlaces for a block.
 std::vector<SpaceBlock> DivideSpace(std::vector<Vec3f> places, const GridFrame& box,
                                     int blocks);
 inline constexpr int64_t kLeastPlaces = 200;

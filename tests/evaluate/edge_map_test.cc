@@ -5,7 +5,7 @@
 
 #include <cmath>
 
-#include "evaluate/image_network.h"
+#include "evaluate/edge_network.h"
 #include "evaluate/image_quality.h"
 #include "tests/evaluate/synthetic_frames.h"
 

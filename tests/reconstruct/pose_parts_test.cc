@@ -25,6 +25,17 @@ TEST(PoseStrategies, CostIncreases) {
   EXPECT_EQ(PoseStrategies(photos, 30)[0].lens, ColmapLens::kSimpleRadial);
 }
 
+TEST(PoseStrategies, OneOfVeryManyPhotosHasFewerFeatures) {
+  std::vector<StagedPhoto> photos(500);
+  for (StagedPhoto& photo : photos) photo.width = 1920, photo.height = 1080;
+  const PoseStrategy many = PoseStrategies(photos, 30)[0];
+  EXPECT_EQ(many.pairing, Pairing::kSimilar);
+  photos.resize(501, photos[0]);
+  const std::vector<PoseStrategy> very_many = PoseStrategies(photos, 30);
+  EXPECT_LT(very_many[0].max_features, many.max_features);
+  for (const PoseStrategy& strategy : very_many) EXPECT_NE(strategy.pairing, Pairing::kAll);
+}
+
 TEST(PoseStrategies, H148_MixedSizesAndFocalLengthsHaveTheirOwnCameras) {
   std::vector<StagedPhoto> photos = {{"a", "0", "", 640, 480, 0},
                                      {"b", "1", "", 480, 640, 0},

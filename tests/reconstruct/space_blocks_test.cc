@@ -33,7 +33,7 @@ int64_t CountIn(const std::vector<Vec3f>& places, const SplatHold& hold) {
 
 // Without last turns.
 std::vector<SpaceBlock> FirstOf(std::vector<SpaceBlock> blocks) {
-  std::erase_if(blocks, [](const SpaceBlock& block) { return block.first >= 0; });
+  std::erase_if(blocks, [](const SpaceBlock& block) { return block.repeats >= 0; });
   return blocks;
 }
 
@@ -110,9 +110,9 @@ TEST(SpaceBlocks, ABlockThatCameFirstHasALastTurn) {
       if (i < static_cast<size_t>(n)) continue;
       EXPECT_GT(block.turn, last);
       // It goes on from its own splats and its neighbours' of all turns.
-      ASSERT_NE(std::ranges::find(block.after, block.first), block.after.end());
-      EXPECT_EQ(block.owned.low.x, blocks[static_cast<size_t>(block.first)].owned.low.x);
-      ++entries[static_cast<size_t>(block.first)];
+      ASSERT_NE(std::ranges::find(block.after, block.repeats), block.after.end());
+      EXPECT_EQ(block.owned.low.x, blocks[static_cast<size_t>(block.repeats)].owned.low.x);
+      ++entries[static_cast<size_t>(block.repeats)];
       for (const Vec3f& place : places)
         if (block.owned.Contains(&place.x)) {
           const int owner = OwnerOf(blocks, &place.x);

@@ -50,7 +50,7 @@ inline std::string MeanNetwork() {
 }
 
 // The logistic function of 3 r - 2 g.
-inline std::string EdgeNetwork() {
+inline std::string TinyEdgeNetwork() {
   TinyOnnx network;
   network.Input("picture", 3);
   PixelConv(&network, "picture", "score", {3, -2, 0});

@@ -9,11 +9,11 @@
 
 namespace regrade {
 
-// An ONNX file with one input [1, 3, height, width], RGB from -1 to 1, of any name. Errors:
-// those of OnnxRunner, and outputs of another shape.
-class ImageNetwork {
+// An ONNX file with one input of any name, [1, 3, height, width], RGB from -1 to 1. Errors:
+// those of OnnxRunner, and an output of another shape.
+class EdgeNetwork {
  public:
-  explicit ImageNetwork(const std::string& path);
+  explicit EdgeNetwork(const std::string& path);
 
   // One channel of the picture's size, as the output [1, 1, height, width] has it.
   Image EdgeMap(const Image& picture) const;
@@ -22,8 +22,8 @@ class ImageNetwork {
   OnnxRunner runner_;
 };
 
-// "gradient" or the ONNX file of an edge network, see ImageNetwork::EdgeMap; empty for an empty
-// text. Errors: those of ImageNetwork.
+// "gradient" or the ONNX file of an edge network, see EdgeNetwork::EdgeMap; empty for an empty
+// text. Errors: those of EdgeNetwork.
 EdgeMapFunction EdgeMaps(const std::string& edges);
 
 }  // namespace regrade

@@ -1,5 +1,5 @@
 // Edge maps by networks: what they do to a sequence's row, and refused files.
-#include "evaluate/image_network.h"
+#include "evaluate/edge_network.h"
 
 #include <gtest/gtest.h>
 
@@ -21,20 +21,20 @@ struct Networks {
   std::string mean = folder / "mean.onnx", edges = folder / "edges.onnx";
   Networks() {
     WriteText(mean, MeanNetwork());
-    WriteText(edges, EdgeNetwork());
+    WriteText(edges, TinyEdgeNetwork());
   }
 };
 
-TEST(ImageNetwork, RefusalsNameTheFile) {
+TEST(EdgeNetwork, RefusalsNameTheFile) {
   const Networks networks;
   const Image picture = ConstantImage(16, 12, 0.5f);
-  EXPECT_REGRADE_ERROR(ImageNetwork(networks.mean).EdgeMap(picture), ExitCode::kExternalProgram,
+  EXPECT_REGRADE_ERROR(EdgeNetwork(networks.mean).EdgeMap(picture), ExitCode::kExternalProgram,
                        "mean.onnx");
-  EXPECT_REGRADE_ERROR(ImageNetwork(networks.edges + "x"), ExitCode::kExternalProgram,
+  EXPECT_REGRADE_ERROR(EdgeNetwork(networks.edges + "x"), ExitCode::kExternalProgram,
                        "there is no such file");
 }
 
-TEST(ImageNetwork, FramesWithOtherEdgesAreLessAlike) {
+TEST(EdgeNetwork, FramesWithOtherEdgesAreLessAlike) {
   const Networks networks;
   const Image picture = WaveImage(60, 40, 5, 1);
   Image grey = picture;

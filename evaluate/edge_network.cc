@@ -1,4 +1,4 @@
-#include "evaluate/image_network.h"
+#include "evaluate/edge_network.h"
 
 #include <memory>
 #include <utility>
@@ -8,13 +8,13 @@
 
 namespace regrade {
 
-ImageNetwork::ImageNetwork(const std::string& path)
+EdgeNetwork::EdgeNetwork(const std::string& path)
     : runner_(
           path,
           "it must have one input, [1, 3, height, width] from -1 to 1, and take pictures of "
           "any size") {}
 
-Image ImageNetwork::EdgeMap(const Image& picture) const {
+Image EdgeNetwork::EdgeMap(const Image& picture) const {
   OnnxArray output = runner_.Run({{"", &picture}});
   if (output.shape != std::vector<int>{1, 1, picture.height, picture.width})
     runner_.Refuse(Concat("its output is not an edge map of ", picture.width, " x ",
@@ -28,7 +28,7 @@ Image ImageNetwork::EdgeMap(const Image& picture) const {
 EdgeMapFunction EdgeMaps(const std::string& edges) {
   if (edges.empty()) return {};
   if (edges == kGradientEdges) return GradientEdges;
-  return [network = std::make_shared<const ImageNetwork>(edges)](const Image& picture) {
+  return [network = std::make_shared<const EdgeNetwork>(edges)](const Image& picture) {
     return network->EdgeMap(picture);
   };
 }
