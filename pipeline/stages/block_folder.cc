@@ -148,8 +148,7 @@ void RepairField(const RunContext& context) {
 
 std::string BlockName(const BlockPlan& plan, int block) {
   const int repeats = plan.blocks[static_cast<size_t>(block)].repeats;
-  return repeats < 0 ? Concat("block ", block + 1)
-                     : Concat("last turn of block ", repeats + 1);
+  return repeats < 0 ? Concat("block ", block + 1) : Concat("last turn of block ", repeats + 1);
 }
 
 std::string BlocksText(const std::vector<int>& blocks, int all, const char* verb_of_one,

@@ -68,8 +68,7 @@ std::vector<PoseStrategy> PoseStrategies(const std::vector<StagedPhoto>& photos,
   if (photos.size() <= kFewPairs) quick.max_features = 4096;
   const bool very_many = photos.size() > kVeryMany;
   if (very_many) quick.max_features = kFeaturesOfVeryMany;
-  quick.first_octave =
-      (side < kSmallSide && !very_many) || photos.size() <= kFewPairs ? -1 : 0;
+  quick.first_octave = (side < kSmallSide && !very_many) || photos.size() <= kFewPairs ? -1 : 0;
   quick.lens = simple_lens ? ColmapLens::kSimpleRadial : ColmapLens::kOpenCv;
   quick.pairing = PairingOf(photos, static_cast<size_t>(all_pairs_up_to));
 
