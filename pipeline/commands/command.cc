@@ -15,6 +15,7 @@
 #include "kernels/base/error.h"
 #include "pipeline/capture/capture_store.h"
 #include "pipeline/files/text.h"
+#include "pipeline/program/device_choice.h"
 #include "pipeline/program/question.h"
 #include "pipeline/run/resolve_settings.h"
 #include "pipeline/run/run_file.h"
@@ -145,6 +146,8 @@ std::optional<Prepared> Prepare(const Command& command, const Arguments& argumen
   }
   Prepared prepared;
   prepared.words = options->Parse(arguments);
+  if (const auto device = options->Given("device"))
+    options->Replace("device", ShowOneCard(*device));
   const auto check_words = [&] {
     CheckWords(command, prepared.words, preparation.least_words, preparation.most_words);
   };

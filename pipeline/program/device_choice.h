@@ -16,6 +16,12 @@ Backend ChooseBackend(const std::string& device, bool reproducible);
 // take one.
 bool PrefersCard(const std::string& device, bool reproducible);
 
+// "cuda:N" shows this process, and those that it starts, one graphics card alone: the N-th,
+// from 0 on, of those that CUDA_VISIBLE_DEVICES lists, or else of all in nvidia-smi's order.
+// Returns "cuda" then, and any other text as it is. Comes before the first look for a card.
+// Throws Error(kUsage) where N is no number, Error(kResources) where the list is shorter.
+std::string ShowOneCard(const std::string& device);
+
 // "cpu", or the GPU's name.
 std::string DeviceName(Backend backend);
 

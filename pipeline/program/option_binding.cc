@@ -121,6 +121,11 @@ std::optional<std::string> OptionSet::Given(const std::string& name) const {
   return std::nullopt;
 }
 
+void OptionSet::Replace(const std::string& name, const std::string& value) {
+  for (Flag& flag : flags_)
+    if (flag.name == name) flag.value = value;
+}
+
 void OptionSet::Assign(const Entry& entry, const std::string& text, const std::string& where) {
   const OptionInfo& info = entry.info;
   std::visit(

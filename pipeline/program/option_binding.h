@@ -33,6 +33,8 @@ class OptionSet {
 
   // The value of --name on the command line, the first of several.
   std::optional<std::string> Given(const std::string& name) const;
+  // Gives --name another value, where it was given.
+  void Replace(const std::string& name, const std::string& value);
 
   // Writes the values of a JSON object {"name": value, ...} into the structs. Throws
   // Error(kUsage) with line and column for unknown names and bad values.

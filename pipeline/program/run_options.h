@@ -52,7 +52,8 @@ struct RunOptions {
     bind("paper-config", paper_config,
          {.help = kPaperConfigHelp, .choices = "auto|syn|llff|tnt|custom"});
     bind("device", device,
-         {.help = "the processor for fits, restyling and frames", .choices = "auto|cpu|cuda"});
+         {.help = "the processor for fits, restyling and frames; cuda:1 is the second card",
+          .choices = "auto|cpu|cuda"});
     bind("seed", seed, {.help = "seed of all random numbers"});
     bind("holdout", holdout,
          {.unit = "photos",

@@ -2,6 +2,7 @@
 // jumps, a working folder that is gone, no GPU.
 #include <gtest/gtest.h>
 
+#include <cstdlib>
 #include <filesystem>
 
 #include "kernels/device/device_memory.h"
@@ -98,6 +99,28 @@ TEST(Surroundings, F27_RelativePathsAndBlanks) {
              "./a capture/truth", "--out", "an out/../an out", "--tracks", "given"});
   EXPECT_EQ(outcome.code, 0) << outcome.text;
   EXPECT_TRUE(fs::exists(folder / "an out/poses/photos.json"));
+}
+
+TEST(Surroundings, ACardByItsNumber) {
+  const char* const before = std::getenv("CUDA_VISIBLE_DEVICES");
+  const std::string kept = before != nullptr ? before : "";
+  const auto shown = [] { return std::string(std::getenv("CUDA_VISIBLE_DEVICES")); };
+  unsetenv("CUDA_VISIBLE_DEVICES");
+  EXPECT_EQ(ShowOneCard("auto"), "auto");
+  EXPECT_EQ(std::getenv("CUDA_VISIBLE_DEVICES"), nullptr);
+  EXPECT_EQ(ShowOneCard("cuda:1"), "cuda");
+  EXPECT_EQ(shown(), "1");
+  setenv("CUDA_VISIBLE_DEVICES", "4,GPU-ab,6", 1);  // what a cluster's engine gave the job
+  for (const char* device : {"cuda:", "cuda:x", "cuda:-1", "cuda:1x", "cuda:99999999999"})
+    EXPECT_REGRADE_ERROR(ShowOneCard(device), ExitCode::kUsage, "--device");
+  EXPECT_REGRADE_ERROR(ShowOneCard("cuda:3"), ExitCode::kResources, "--device cuda:3");
+  EXPECT_EQ(shown(), "4,GPU-ab,6");
+  EXPECT_EQ(ShowOneCard("cuda:1"), "cuda");
+  EXPECT_EQ(shown(), "GPU-ab");
+  if (before != nullptr)
+    setenv("CUDA_VISIBLE_DEVICES", kept.c_str(), 1);
+  else
+    unsetenv("CUDA_VISIBLE_DEVICES");
 }
 
 TEST(Surroundings, F77_NoGpu) {
