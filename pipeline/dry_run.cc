@@ -159,6 +159,10 @@ void PlanNewScene(const std::string& last, RunContext* context) {
 }
 
 void SayPlan(const RunContext& context) {
+  const JsonValue values = context.options.Values(), setters = context.options.Setters();
+  for (const auto& [name, by] : setters.AsObject())
+    context.console->Detail(
+        Concat(name, " ", DumpJson(values.At(name), -1), ": ", by.AsString()));
   double seconds = 0;
   JsonValue stages = JsonValue::Array();
   for (const PlannedStage& planned : context.planned) {

@@ -34,6 +34,7 @@ std::optional<std::string> Behind(const std::string& text, const char* beginning
 
 void OptionSet::AddEntry(Entry entry) {
   REGRADE_CHECK(Find(entry.name) == nullptr);
+  entry.plain = ValueOf(entry);
   entries_.push_back(std::move(entry));
 }
 
@@ -41,6 +42,10 @@ const OptionSet::Entry* OptionSet::Find(const std::string& name) const {
   for (const Entry& entry : entries_)
     if (entry.name == name) return &entry;
   return nullptr;
+}
+
+OptionSet::Entry* OptionSet::Find(const std::string& name) {
+  return const_cast<Entry*>(std::as_const(*this).Find(name));
 }
 
 std::vector<std::string> OptionSet::Names() const {
@@ -156,7 +161,7 @@ void OptionSet::ApplyConfig(const JsonValue& values, const std::string& where) {
   };
   if (!values.IsObject()) throw UsageError("an object of options expected", place(values));
   for (const auto& [name, value] : values.AsObject()) {
-    const Entry* entry = Find(name);
+    Entry* const entry = Find(name);
     if (entry == nullptr) {
       Words all = {};
       for (const Entry& known : entries_) all.push_back(known.name);
@@ -167,6 +172,7 @@ void OptionSet::ApplyConfig(const JsonValue& values, const std::string& where) {
     if (value.IsObject() || value.IsNull())
       throw UsageError("a value expected for \"" + name + "\"", place(value));
     const std::string where_of = place(value) + ": " + name;
+    entry->set_by = where;
     if (IsTextList(*entry)) std::get<std::vector<std::string>*>(entry->target)->clear();
     if (!IsTextList(*entry) || value.IsString()) {  // one text is a list of one
       Assign(*entry, FlagText(value), where_of);
@@ -184,7 +190,32 @@ void OptionSet::ApplyFlags() {
   for (const Flag& flag : flags_)
     if (const Entry* entry = Find(flag.name); IsTextList(*entry))
       std::get<std::vector<std::string>*>(entry->target)->clear();
-  for (const Flag& flag : flags_) Assign(*Find(flag.name), flag.value, "--" + flag.name);
+  for (const Flag& flag : flags_) {
+    Entry* const entry = Find(flag.name);
+    Assign(*entry, flag.value, "--" + flag.name);
+    entry->set_by = kFlag;
+  }
+}
+
+const std::string& OptionSet::SetBy(const std::string& name) const {
+  static const std::string kNobody;
+  const Entry* const entry = Find(name);
+  return entry != nullptr ? entry->set_by : kNobody;
+}
+
+JsonValue OptionSet::Setters() const {
+  JsonValue setters = JsonValue::Object();
+  for (const Entry& entry : entries_)
+    if (!entry.set_by.empty() &&
+        (!entry.set_by.starts_with(kPresetOf) || !(ValueOf(entry) == entry.plain)))
+      setters[entry.name] = entry.set_by;
+  return setters;
+}
+
+void OptionSet::NoteSetters(const JsonValue& setters) {
+  for (const auto& [name, by] : setters.AsObject())
+    if (Entry* const entry = Find(name); entry != nullptr && !entry->set_by.empty())
+      entry->set_by = by.AsString();
 }
 
 JsonValue OptionSet::ValueOf(const Entry& entry) {

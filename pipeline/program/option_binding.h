@@ -16,6 +16,8 @@ namespace regrade {
 class OptionSet {
  public:
   using Texts = std::vector<std::string>;
+  // What options say of who set them: a flag, or a preset, whose name follows.
+  static constexpr char kFlag[] = "flag", kPresetOf[] = "preset ";
 
   // `options` must outlive the set. `heading` is that of its part of the help, and nothing
   // else. Flag names must be unique within the set (checked).
@@ -45,6 +47,12 @@ class OptionSet {
 
   // {"name": value, ...} of everything in effect.
   JsonValue Values() const;
+  // Who set an option last: kFlag, or the `where` of ApplyConfig. Empty: it has its default.
+  const std::string& SetBy(const std::string& name) const;
+  // {"name": who set it, ...}; of what presets set, where it differs from the default.
+  JsonValue Setters() const;
+  // Takes over who set options, from the Setters() of an earlier start.
+  void NoteSetters(const JsonValue& setters);
 
   // An option's text that leads out of a run's folder, see OptionInfo.
   struct Outside {
@@ -76,6 +84,8 @@ class OptionSet {
     std::string heading, name;
     Target target;
     OptionInfo info;
+    JsonValue plain = {};  // the value when it was added
+    std::string set_by = {};
   };
   struct Binder {
     OptionSet* set;
@@ -104,6 +114,7 @@ class OptionSet {
 
   void AddEntry(Entry entry);
   const Entry* Find(const std::string& name) const;
+  Entry* Find(const std::string& name);
   std::vector<std::string> Names() const;
   static void Assign(const Entry& entry, const std::string& text, const std::string& where);
   static bool IsTextList(const Entry& entry) {

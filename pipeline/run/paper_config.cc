@@ -203,13 +203,13 @@ void CheckPaper(const std::string& preset, const std::string& config) {
 }
 
 void ApplyPaperChoice(const PaperChoice& choice, OptionSet* options) {
-  const JsonValue base = PaperValues(kPaperBase), now = options->Values(),
-                  chosen = PaperValues(choice.name);
+  const JsonValue now = options->Values(), chosen = PaperValues(choice.name);
   JsonValue set = JsonValue::Object();
   for (const auto& [name, value] : chosen.AsObject()) {
-    const JsonValue* current = now.Find(name);
-    if (current != nullptr && !options->Given(name) && *current == base.At(name))
-      set[name] = value;
+    const std::string& by = options->SetBy(name);
+    const bool is_preset =
+        by.empty() || by == "--paper-config" || by.starts_with(OptionSet::kPresetOf);
+    if (now.Find(name) != nullptr && is_preset) set[name] = value;
   }
   options->ApplyConfig(set, "--paper-config");
 }

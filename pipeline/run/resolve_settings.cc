@@ -117,20 +117,35 @@ JsonValue OfFolder(const RunFile& file, const SettingsSources& sources, const Js
   return kept;
 }
 
+// Writes what differs from the options or was set by name, so that the rest stays its preset's.
+void ApplyWhatDiffers(const RunFile& file, const std::string& path, OptionSet* options) {
+  JsonValue set = JsonValue::Object();
+  const JsonValue now = options->Values();
+  for (const auto& [name, value] : file.options.AsObject()) {
+    const JsonValue* const current = now.Find(name);
+    if (current == nullptr || !(*current == value) || file.set_by.Find(name) != nullptr)
+      set[name] = value;
+  }
+  options->ApplyConfig(set, path);
+  options->NoteSetters(file.set_by);
+}
+
 void ApplyRunFile(const RunFile& file, const std::string& path,
                   const std::vector<std::string>& taken, bool on_card, OptionSet* options) {
   if (taken.empty()) {
     const JsonValue* preset = file.options.IsObject() ? file.options.Find("preset") : nullptr;
     // An unknown preset is refused below, with its line.
     if (preset != nullptr && preset->IsString() && IsPreset(preset->AsString()))
-      ApplyKnown(PresetValues(preset->AsString(), on_card), path, options);
-    options->ApplyConfig(file.options, path);
-    return;
+      ApplyKnown(PresetValues(preset->AsString(), on_card),
+                 OptionSet::kPresetOf + preset->AsString(), options);
+    if (!file.options.IsObject()) return options->ApplyConfig(file.options, path);  // refused
+    return ApplyWhatDiffers(file, path, options);
   }
   JsonValue kept = JsonValue::Object();
   for (const std::string& name : taken)
     if (const JsonValue* value = file.options.Find(name)) kept[name] = *value;
   options->ApplyConfig(kept, path);
+  options->NoteSetters(file.set_by);
 }
 
 }  // namespace
@@ -140,7 +155,8 @@ std::vector<std::string> ResolveSettings(const SettingsSources& sources, OptionS
   const bool on_card = OnCard(*options);
   // Not to a command that no preset is meant for: `regrade synth` has --effects of its own.
   if (options->Values().Find("preset") != nullptr || !sources.run_json.empty())
-    ApplyKnown(PresetValues(sources.preset, on_card), "--preset", options);
+    ApplyKnown(PresetValues(sources.preset, on_card), OptionSet::kPresetOf + sources.preset,
+               options);
   const auto config = options->Given("config");
   const ConfigFile given = config ? ReadConfig(*config) : ConfigFile();
   if (!sources.run_json.empty()) {
@@ -157,7 +173,7 @@ std::vector<std::string> ResolveSettings(const SettingsSources& sources, OptionS
     if (sources.run_json.empty()) words = given.run.words;
   }
   if (const auto preset = options->Given("preset"))
-    ApplyKnown(PresetValues(*preset, on_card), "--preset", options);
+    ApplyKnown(PresetValues(*preset, on_card), OptionSet::kPresetOf + *preset, options);
   if (const auto config = options->Given("paper-config"); config && config != "auto") {
     const JsonValue values = options->Values();
     if (const JsonValue* preset = values.Find("preset");

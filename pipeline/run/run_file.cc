@@ -61,6 +61,7 @@ RunFile RunFileOf(const JsonValue& value) {
   for (const JsonValue& word : value.At("arguments").AsArray())
     file.words.push_back(word.AsString());
   file.options = OptionsOf(value.At("options"));
+  if (const JsonValue* const set_by = value.Find("set_by")) file.set_by = *set_by;
   return file;
 }
 
@@ -123,13 +124,19 @@ JsonValue RunFileJson(const std::string& command, const RunContext& context) {
   // Options of one start are not repeated.
   const JsonValue start = OptionValues(context.settings.start, context.parts),
                   refine = OptionValues(context.refine);
-  JsonValue kept = JsonValue::Object();
+  const auto stays = [&](const std::string& name) {
+    return start.Find(name) == nullptr && refine.Find(name) == nullptr;
+  };
+  JsonValue kept = JsonValue::Object(), set_by = JsonValue::Object();
   for (const auto& [name, value] : options.AsObject())
-    if (start.Find(name) == nullptr && refine.Find(name) == nullptr) kept[name] = value;
+    if (stays(name)) kept[name] = value;
+  const JsonValue setters = context.options.Setters();
+  for (const auto& [name, by] : setters.AsObject())
+    if (stays(name)) set_by[name] = by;
   JsonValue run = JsonValue::Object{
-      {"schema", kRunSchema},        {"regrade", REGRADE_VERSION},        {"command", command},
-      {"arguments", words},          {"seed", context.settings.run.seed}, {"options", kept},
-      {"fingerprints", fingerprints}};
+      {"schema", kRunSchema}, {"regrade", REGRADE_VERSION},        {"command", command},
+      {"arguments", words},   {"seed", context.settings.run.seed}, {"options", kept},
+      {"set_by", set_by},     {"fingerprints", fingerprints}};
   if (context.style != nullptr && !context.settings.style.pictures.empty())
     run[kPictureHash] = PicturesHash(context.settings.style.pictures);
   return run;

@@ -9,8 +9,9 @@
 namespace regrade {
 
 struct RunFile {
-  std::vector<std::string> words;  // arguments that are not options, paths absolute
-  JsonValue options;               // object, without options that earlier versions had
+  std::vector<std::string> words;          // arguments that are not options, paths absolute
+  JsonValue options;                       // object, without options that earlier versions had
+  JsonValue set_by = JsonValue::Object();  // see OptionSet::Setters
 };
 
 // Throws Error(kUsage) with line and column for what is not such a file, or of another schema.

@@ -47,6 +47,38 @@ TEST(RunSettings, AllOptionsBind) {
   EXPECT_REGRADE_ERROR(ApplyPreset("fast", false, &settings), ExitCode::kUsage, "draft");
 }
 
+TEST(ResolveSettings, EachOptionSaysWhoSetIt) {
+  const TemporaryFolder folder;
+  const std::string config = folder / "some.json", run = folder / "run.json";
+  WriteText(config, R"({"splat-opacity-weight": 0.03, "gaps": [2]})");
+  RunSettings settings;
+  OptionSet options;
+  settings.Bind(&options);
+  options.Parse({"--preset", "draft", "--config", config, "--seed", "0"});
+  ResolveSettings({}, &options);
+  JsonValue setters = options.Setters();
+  EXPECT_EQ(setters.At("splat-steps").AsString(), "preset draft");
+  EXPECT_EQ(setters.At("splat-opacity-weight").AsString(), config);  // its default, too
+  EXPECT_EQ(setters.At("gaps").AsString(), config);
+  EXPECT_EQ(setters.At("seed").AsString(), "flag");
+  EXPECT_EQ(setters.Find("holdout"), nullptr);
+
+  // A command that continues the run knows it, and changes some.
+  WriteText(run, DumpJson(JsonValue::Object{{"schema", 2},
+                                            {"arguments", JsonValue::Array()},
+                                            {"options", options.Values()},
+                                            {"set_by", setters}},
+                          -1));
+  RunSettings later;
+  OptionSet again;
+  later.Bind(&again);
+  again.Parse({"--gaps", "3"});
+  ResolveSettings({.run_json = run}, &again);
+  setters["gaps"] = "flag";
+  for (const auto& [name, by] : setters.AsObject())
+    EXPECT_EQ(again.SetBy(name), again.IsOnce(name) ? "" : by.AsString()) << name;
+}
+
 TEST(ResolveSettings, PresetsGiveTheirValues) {
   for (const char* preset : kPresets) {
     RunSettings expected;
