@@ -51,7 +51,7 @@ struct SplatFitOptions {
           .min = 1,
           .max = 1000000});
     bind("splats", thousands,
-         {.unit = "thousands", .help = "most splats of a field", .min = 1, .max = 20000});
+         {.unit = "thousands", .help = "most splats of a field", .min = 1, .max = 1000000});
     bind("splat-degree", sh_degree,
          {.help = "view dependence: degree of the splats' spherical harmonics",
           .min = 0,
