@@ -8,6 +8,7 @@
 #include "kernels/base/error.h"
 #include "pipeline/dry_run.h"
 #include "pipeline/files/text.h"
+#include "pipeline/program/memory.h"
 #include "pipeline/report/assessment.h"
 #include "pipeline/report/records.h"
 #include "pipeline/report/requirement_results.h"
@@ -87,6 +88,19 @@ PlannedStage Planned(const Stage& stage, bool done, RunContext* context) {
 
 }  // namespace
 
+namespace {
+
+// Stages of one command keep the photos that they read, unless its memory is limited.
+void KeepPhotos(RunContext* context) {
+  constexpr int64_t kMost = int64_t{1} << 30, kOfFree = 8;
+  const RunSettings& settings = context->settings;
+  if (context->photos != nullptr || settings.run.max_memory_gb > 0) return;
+  const int64_t free = static_cast<int64_t>(ReadMemoryStatus().available);
+  context->photos = std::make_shared<KeptPhotos>(std::min(kMost, free / kOfFree));
+}
+
+}  // namespace
+
 bool RunPipeline(const std::string& first, const std::string& last, RunContext* context,
                  int styles_after) {
   const bool dry_run = context->settings.start.dry_run;
@@ -97,6 +111,7 @@ bool RunPipeline(const std::string& first, const std::string& last, RunContext* 
   for (const StageEntry* before = std::begin(kStages); before != Find(first); ++before)
     runner.Require(before->name, "regrade run");
   Expect(first, last, styles_after, context, &runner);
+  KeepPhotos(context);
   for (const StageEntry* entry = Find(first); entry != std::end(kStages); ++entry) {
     const Stage stage = entry->make(context);
     const bool done = runner.Run(stage);
@@ -107,6 +122,9 @@ bool RunPipeline(const std::string& first, const std::string& last, RunContext* 
     if (!done) return false;
     if (last == entry->name) break;
   }
+  if (const KeptPhotos* const photos = context->photos.get())
+    context->console->Detail(Concat("photos: ", photos->decoded(), " decoded, ",
+                                    photos->taken(), " taken from memory"));
   return true;
 }
 

@@ -32,6 +32,17 @@ Image AtWorkingSize(Image image, int longest_side) {
   return Resize(image, width, height);
 }
 
+// At working size, as it was taken.
+Image Decoded(const CaptureView& view, int longest_side) {
+  Image photo = ReadImage(view.path);
+  if (photo.width != view.camera.width || photo.height != view.camera.height)
+    throw InputError(Concat(photo.width, " x ", photo.height, " pixels, but its camera has ",
+                            view.camera.width, " x ", view.camera.height),
+                     view.path, "the staged photo was changed: use --restart-from pose");
+  if (photo.channels != 3) throw InputError("not an RGB picture", view.path);
+  return AtWorkingSize(std::move(photo), longest_side);
+}
+
 Image Filled(int width, int height, float value) {
   Image image(width, height, 1);
   std::ranges::fill(image.pixels, value);
@@ -97,6 +108,12 @@ WorkingViews WorkingViews::AtSize(int photo_size) const {
   return views;
 }
 
+WorkingViews WorkingViews::KeepingPhotos(std::shared_ptr<KeptPhotos> kept) const {
+  WorkingViews views = *this;
+  views.kept_ = std::move(kept);
+  return views;
+}
+
 std::vector<int> WorkingViews::Indices(bool held_out) const {
   std::vector<int> indices;
   const std::vector<bool> held = HeldOutViews(*capture_, holdout_);
@@ -120,14 +137,8 @@ std::vector<Camera> WorkingViews::Cameras() const {
 }
 
 Image WorkingViews::Photo(int i) const {
-  const CaptureView& view = View(i);
-  Image photo = ReadImage(view.path);
-  if (photo.width != view.camera.width || photo.height != view.camera.height)
-    throw InputError(Concat(photo.width, " x ", photo.height, " pixels, but its camera has ",
-                            view.camera.width, " x ", view.camera.height),
-                     view.path, "the staged photo was changed: use --restart-from pose");
-  if (photo.channels != 3) throw InputError("not an RGB picture", view.path);
-  photo = AtWorkingSize(std::move(photo), photo_size_);
+  const auto decode = [&view = View(i), size = photo_size_] { return Decoded(view, size); };
+  Image photo = kept_ ? kept_->At(View(i).path, photo_size_, decode) : decode();
   photo = AsSeen(i, std::move(photo));
   UndoGain(gains_.Of(i), &photo);
   return photo;

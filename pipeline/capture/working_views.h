@@ -8,6 +8,7 @@
 
 #include "kernels/field/field_kind.h"
 #include "kernels/scene/capture.h"
+#include "pipeline/capture/kept_photos.h"
 #include "pipeline/capture/photo_gains.h"
 #include "pipeline/fields/field_file.h"
 
@@ -42,6 +43,8 @@ class WorkingViews {
   WorkingViews WithGains(PhotoGains gains) const;
   WorkingViews AsTaken() const { return WithGains({}); }
   WorkingViews AtSize(int photo_size) const;
+  // Photos that are read are kept there; null: nowhere.
+  WorkingViews KeepingPhotos(std::shared_ptr<KeptPhotos> kept) const;
 
   const Capture& capture() const { return *capture_; }
   const CaptureView& View(int i) const { return capture_->views[i]; }
@@ -78,6 +81,7 @@ class WorkingViews {
   bool IsUndistorted(int i) const { return pinholes_ && LensOf(i).lens != LensModel::kPinhole; }
 
   std::shared_ptr<const Capture> capture_;
+  std::shared_ptr<KeptPhotos> kept_;
   int photo_size_, holdout_;
   PhotoGains gains_;
   Similarity field_from_world_;

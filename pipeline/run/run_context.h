@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -38,6 +39,7 @@ struct RunContext {
   std::vector<PlannedStage> planned = {};       // in a dry run
   FilmParts parts = {};                         // of `regrade render`
   RefineOptions refine = {};                    // of `regrade refine`
+  std::shared_ptr<KeptPhotos> photos = {};      // what several stages read
 
   // What `source` is, or the capture that gives a file of splats its cameras. Folders of masks
   // in it hold no photos.
@@ -51,6 +53,7 @@ struct RunContext {
   WorkingViews Views() const {
     return ReadWorkingViews(workspace->Path("poses"), settings.scene.photo_size,
                             settings.run.holdout)
+        .KeepingPhotos(photos)
         .CamerasFor(settings.scene.Kind());
   }
   // Where a stage has its record and its results. A style must be chosen for a stage of one.
