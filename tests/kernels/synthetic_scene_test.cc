@@ -11,6 +11,7 @@
 #include "kernels/base/random.h"
 #include "kernels/synthetic/ray_trace.h"
 #include "kernels/synthetic/solid_index.h"
+#include "tests/support/expect_error.h"
 #include "tests/support/threads.h"
 
 namespace regrade {
@@ -250,13 +251,7 @@ TEST(SyntheticScene, HighlightsDependOnTheViewAndAreOffBitwise) {
 }
 
 TEST(SyntheticScene, UnknownNameIsUsageAndListsTheScenes) {
-  try {
-    MakeSyntheticScene("garden", 0);
-    FAIL();
-  } catch (const Error& error) {
-    EXPECT_EQ(error.code(), ExitCode::kUsage);
-    EXPECT_NE(error.hint().find("table|wall|room"), std::string::npos);
-  }
+  EXPECT_REGRADE_ERROR(MakeSyntheticScene("garden", 0), ExitCode::kUsage, "table|wall|room");
 }
 
 }  // namespace

@@ -13,6 +13,7 @@
 #include "reconstruct/colmap/listed_pairs.h"
 #include "tests/pipeline/clip_file.h"
 #include "tests/pipeline/picture_corpus.h"
+#include "tests/support/expect_error.h"
 
 namespace regrade {
 namespace {
@@ -203,14 +204,8 @@ TEST_F(ClipFrames, F90_ADamagedFilmIsNamedAndTheRestIsTaken) {
   EXPECT_EQ(result.statuses[0].file, "cut.mp4");
   EXPECT_TRUE(Contains(result.statuses[0].why, "cannot read this film"))
       << result.statuses[0].why;
-  try {
-    IngestPhotos(scratch_ / "in/cut.mp4", scratch_ / "out", {}, {});
-    FAIL();
-  } catch (const Error& error) {
-    EXPECT_EQ(error.code(), ExitCode::kInput);
-    EXPECT_EQ(error.where(), scratch_ / "in/cut.mp4");
-    EXPECT_TRUE(Contains(error.what_failed(), "cannot read this film")) << error.what();
-  }
+  EXPECT_REGRADE_ERROR(IngestPhotos(scratch_ / "in/cut.mp4", scratch_ / "out", {}, {}),
+                       ExitCode::kInput, (scratch_ / "in/cut.mp4") + ": cannot read this film");
 }
 
 std::vector<StagedPhoto> Staged(int photos, int frames) {

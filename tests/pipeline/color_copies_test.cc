@@ -27,11 +27,6 @@ constexpr char kFirstPhoto[] = "/images/00000.png";
 class ColorCopies : public testing::PictureTest {
  protected:
   void SetUp() override { testing::WriteCapture(scratch_ / "srgb", 16, "128x96"); }
-  static int Regrade(const std::vector<std::string>& arguments) {
-    const testing::ProgramOutcome done = testing::RunProgram(REGRADE_PROGRAM, arguments);
-    if (done.code != 0) std::printf("%s\n", done.text.c_str());
-    return done.code;
-  }
   // Photos as 16-bit TIFF files, or 8-bit PNG files, of other primaries.
   void Copy(const std::string& name, const Primaries& primaries, double gamma,
             const std::string& icc, bool tiff) {
@@ -50,30 +45,29 @@ class ColorCopies : public testing::PictureTest {
   };
   Seen Reconstruct(const std::string& name, const std::string& seed = "0") {
     const std::string out = scratch_ / name + "_out" + seed;
-    EXPECT_EQ(Regrade({"reconstruct",
-                       scratch_ / name + "/truth",
-                       "--out",
-                       out,
-                       "--seed",
-                       seed,
-                       "--photo-size",
-                       "96",
-                       "--field",
-                       "voxels",
-                       "--fit-resolutions",
-                       "32",
-                       "--fit-steps",
-                       "300",
-                       "--threads",
-                       "2",
-                       "--tracks",
-                       "given",
-                       "--holdout",
-                       "0",
-                       "--effects",
-                       "exposure=off,view-dependence=off",
-                       "--reproducible"}),
-              0);
+    testing::Said({"reconstruct",
+                   scratch_ / name + "/truth",
+                   "--out",
+                   out,
+                   "--seed",
+                   seed,
+                   "--photo-size",
+                   "96",
+                   "--field",
+                   "voxels",
+                   "--fit-resolutions",
+                   "32",
+                   "--fit-steps",
+                   "300",
+                   "--threads",
+                   "2",
+                   "--tracks",
+                   "given",
+                   "--holdout",
+                   "0",
+                   "--effects",
+                   "exposure=off,view-dependence=off",
+                   "--reproducible"});
     const StoredField stored = ReadFieldFile(out + "/field.npz");
     const WorkingViews views = ReadWorkingViews(out + "/poses", 96, 0).InField(stored);
     Image renders(96, 0, 3);

@@ -14,6 +14,7 @@
 #include "pipeline/images/video_writer.h"
 #include "tests/pipeline/color_files.h"
 #include "tests/pipeline/picture_corpus.h"
+#include "tests/support/expect_error.h"
 
 namespace regrade {
 namespace {
@@ -139,12 +140,7 @@ TEST_F(DecoderProcessTest, ACrashNamesTheFile) {
   DecodeApart({.command = Script("kill -ABRT $$")});
   EXPECT_TRUE(Contains(FailureOf(path).what, "(Aborted)"));
   DecodeApart({.command = {"/nowhere/decoder"}});
-  try {
-    DecodePhoto(path);
-    ADD_FAILURE() << "decoded by no program";
-  } catch (const Error& error) {
-    EXPECT_EQ(error.code(), ExitCode::kExternalProgram);
-  }
+  EXPECT_REGRADE_ERROR(DecodePhoto(path), ExitCode::kExternalProgram, "");
 }
 
 TEST_F(DecoderProcessTest, TimeAndMemoryAreBounded) {

@@ -30,7 +30,7 @@ TEST(EvaluateFolders, FramesOfOtherMomentsArePairedByNumber) {
   for (int i = 1; i < 7; ++i)
     WriteText(folder / ("styled/take2_" + std::to_string(i) + ".png"), EncodePng8(Frame(i)));
   WriteFrames(folder / "target", 6);
-  const Outcome outcome =
+  const ProgramOutcome outcome =
       Evaluate({"--frames", folder / "styled", "--reference", folder / "source", "--target",
                 folder / "target", "--gaps", "1", "--out", folder / "out"});
   ASSERT_EQ(outcome.code, 0) << outcome.text;
@@ -65,7 +65,7 @@ TEST(EvaluateFolders, FlowFilesBelongToTheirFrames) {
         WriteFlowFile(folder / (name + "/" + (back ? FlowFileName(b, a) : FlowFileName(a, b))),
                       flow);
       }
-    const Outcome outcome =
+    const ProgramOutcome outcome =
         Evaluate({"--frames", folder / "styled", "--reference", folder / "source", "--gaps",
                   "1", "--flow", "files:" + (folder / name), "--out", folder / "out"});
     EXPECT_EQ(outcome.code, 0) << outcome.text;
@@ -92,11 +92,11 @@ TEST(EvaluateFolders, SeveralFoldersAreComparedPairByPair) {
     words.insert(words.end(), more.begin(), more.end());
     return Evaluate(words);
   };
-  const Outcome outcome = evaluate({"--label", "Ours", "Other & co", "--table", "latex",
-                                    "--require", "styled-2:tc-psnr:1<=90"});
+  const ProgramOutcome outcome = evaluate({"--label", "Ours", "Other & co", "--table", "latex",
+                                           "--require", "styled-2:tc-psnr:1<=90"});
   ASSERT_EQ(outcome.code, 0) << outcome.text;
-  EXPECT_OUTPUT(outcome, "minus Ours & 95 \\%");
-  EXPECT_OUTPUT(outcome, "\nOther \\& co & 1 & 5 & ");
+  EXPECT_SAYS(outcome, "minus Ours & 95 \\%");
+  EXPECT_SAYS(outcome, "\nOther \\& co & 1 & 5 & ");
   const JsonValue report = ReadJsonFile(folder / "out/report.json");
   EXPECT_EQ(report.At("labels").At("styled_2").AsString(), "Other & co");
   const JsonValue ours = Row(report, "styled"), other = Row(report, "styled_2");
@@ -115,11 +115,11 @@ TEST(EvaluateFolders, SeveralFoldersAreComparedPairByPair) {
            {{"--label"}, "its value is missing"},
            {{"--require", "styled-3:tc-psnr:1>=1"}, "styled_3"},
            {{"--junit", folder / "j.xml"}, "add --require"}}) {
-    const Outcome refused = evaluate(more);
+    const ProgramOutcome refused = evaluate(more);
     EXPECT_EQ(refused.code, 2) << refused.text;
-    EXPECT_OUTPUT(refused, part);
+    EXPECT_SAYS(refused, part);
   }
-  const Outcome alone = Evaluate({"--frames", folder / "a", folder / "b"});
+  const ProgramOutcome alone = Evaluate({"--frames", folder / "a", folder / "b"});
   EXPECT_EQ(alone.code, 2) << alone.text;
 }
 
@@ -130,11 +130,11 @@ TEST(EvaluateFolders, RequirementsBecomeTestCases) {
     return Evaluate({"--frames", folder / "styled", "--gaps", "1", "--json", "--require",
                      require, "--junit", folder / "junit.xml"});
   };
-  const Outcome outcome = evaluate("styled:tc-psnr:1>=90,styled:pairs:1>=2");
+  const ProgramOutcome outcome = evaluate("styled:tc-psnr:1>=90,styled:pairs:1>=2");
   EXPECT_EQ(outcome.code, 8);
-  EXPECT_OUTPUT(outcome, "\"event\":\"requirement\"");
-  EXPECT_OUTPUT(outcome, "\"holds\":true");
-  EXPECT_OUTPUT(outcome, "\"holds\":false");
+  EXPECT_SAYS(outcome, "\"event\":\"requirement\"");
+  EXPECT_SAYS(outcome, "\"holds\":true");
+  EXPECT_SAYS(outcome, "\"holds\":false");
   const std::string xml = testing::ReadText(folder / "junit.xml");
   EXPECT_NE(xml.find("tests=\"2\" failures=\"1\""), std::string::npos) << xml;
   // A file of an earlier start does not pass for that of one that failed.
@@ -158,12 +158,13 @@ TEST(EvaluateFolders, MotionFromCamerasAndDepth) {
     words.insert(words.end(), more.begin(), more.end());
     return Evaluate(words);
   };
-  const Outcome exact =
+  const ProgramOutcome exact =
       evaluate({"--protocol", "geometry", "--poses", folder / "s/truth/transforms.json",
                 "--depth", folder / "s/truth/depth"},
                "exact");
   ASSERT_EQ(exact.code, 0) << exact.text;
-  const Outcome flow = evaluate({"--flow", "files:" + (folder / "s/truth/flow")}, "flow");
+  const ProgramOutcome flow =
+      evaluate({"--flow", "files:" + (folder / "s/truth/flow")}, "flow");
   ASSERT_EQ(flow.code, 0) << flow.text;
   const JsonValue a = ReadJsonFile(folder / "exact/report.json"),
                   b = ReadJsonFile(folder / "flow/report.json");
@@ -178,12 +179,12 @@ TEST(EvaluateFolders, MotionFromCamerasAndDepth) {
               Row(a, "styled", gap).At("tc_psnr_unmasked_mean_db").AsDouble() + 0.5);
   }
   std::filesystem::remove(folder / "s/truth/depth/00003.npy");
-  const Outcome missing =
+  const ProgramOutcome missing =
       evaluate({"--mode", "geometry", "--poses", folder / "s/truth/transforms.json", "--depth",
                 folder / "s/truth/depth"},
                "missing");
   EXPECT_EQ(missing.code, 3) << missing.text;
-  EXPECT_OUTPUT(missing, "00003.png");
+  EXPECT_SAYS(missing, "00003.png");
   EXPECT_EQ(evaluate({"--mode", "geometry"}, "none").code, 2);
   EXPECT_EQ(evaluate({"--depth", folder / "s/truth/depth"}, "none").code, 2);
 }

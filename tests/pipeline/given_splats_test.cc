@@ -26,14 +26,11 @@ namespace {
 namespace fs = std::filesystem;
 using testing::ProgramOutcome;
 using testing::ReadText;
+using testing::Regrade;
 using testing::TemporaryFolder;
 using testing::WriteText;
 
 constexpr int64_t kSplats = 600;
-
-ProgramOutcome Regrade(const std::vector<std::string>& arguments) {
-  return testing::RunProgram(REGRADE_PROGRAM, arguments);
-}
 
 // The ball, far from the origin and large, as files may be.
 StoredField Ball() {

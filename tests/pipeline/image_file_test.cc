@@ -14,6 +14,7 @@
 #include "tests/pipeline/libjpeg_file.h"
 #include "tests/pipeline/picture_corpus.h"
 #include "tests/support/data.h"
+#include "tests/support/expect_error.h"
 
 namespace regrade {
 namespace {
@@ -98,13 +99,8 @@ TEST_F(ImageFile, F28_FullDiskKeepsTheOldFileAndLeavesNoTemporary) {
     GTEST_SKIP() << "cannot mount a small disk here";
   const Image small = Photo(64, 64, 1), large = Photo(1000, 1000, 2);
   WritePng8(disk + "/a.png", small);
-  try {
-    WritePng8(disk + "/a.png", large);
-    ADD_FAILURE() << "a megapixel went into 200 kB";
-  } catch (const Error& error) {
-    EXPECT_EQ(error.code(), ExitCode::kResources);
-    EXPECT_TRUE(Contains(error.what_failed(), "No space left"));
-  }
+  EXPECT_REGRADE_ERROR(WritePng8(disk + "/a.png", large), ExitCode::kResources,
+                       "No space left");
   EXPECT_EQ(ReadImage(disk + "/a.png").width, 64);
   EXPECT_EQ(std::distance(std::filesystem::directory_iterator(disk), {}), 1);
   ::umount2(disk.c_str(), MNT_DETACH);
@@ -130,12 +126,8 @@ TEST_F(ImageFile, F31_FileSizeLimitIsAnErrorNotADeath) {
 }
 
 TEST_F(ImageFile, F30_AMissingFolderIsReported) {
-  try {
-    WritePng8(scratch_ / "none/a.png", Photo(64, 64, 1));
-    ADD_FAILURE() << "no error";
-  } catch (const Error& error) {
-    EXPECT_TRUE(Contains(error.what_failed(), "cannot create")) << error.what_failed();
-  }
+  EXPECT_REGRADE_ERROR(WritePng8(scratch_ / "none/a.png", Photo(64, 64, 1)),
+                       ExitCode::kResources, "cannot create");
 }
 
 TEST_F(ImageFile, JpegLooksLikeThePhoto) {
@@ -370,13 +362,8 @@ TEST_F(ImageFile, UnsupportedFormatsAreNamedWithARemedy) {
                                                        "ftypisom",
                                                        12) +
                                                "....");
-  try {
-    DecodePhoto(path);
-    FAIL();
-  } catch (const Error& error) {
-    EXPECT_EQ(error.what_failed(), "video is not supported here");
-    EXPECT_TRUE(Contains(error.hint(), "frames"));
-  }
+  EXPECT_REGRADE_ERROR(DecodePhoto(path), ExitCode::kInput, ": video is not supported here (",
+                       "frames");
   // A raw file has the form of a TIFF with a thumbnail: it is not read as TIFF.
   const std::string refusal = Refusal(Put("a.NEF", FloatTiff(Photo(64, 64, 1))));
   EXPECT_TRUE(Contains(refusal, "camera raw")) << refusal;

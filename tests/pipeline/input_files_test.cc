@@ -8,6 +8,7 @@
 #include "pipeline/capture/ingest_photos.h"
 #include "tests/pipeline/clip_file.h"
 #include "tests/pipeline/picture_corpus.h"
+#include "tests/support/expect_error.h"
 
 namespace regrade {
 namespace {
@@ -129,13 +130,8 @@ TEST_F(InputFolder, F92_APathMayBeAFilm) {
   PutPhoto("b.jpg");
   WriteBytes(folder_ + "/empty.mp4", "");
   for (const char* name : {"b.jpg", "empty.mp4"}) {
-    try {
-      ListInputs(folder_ + "/" + name);
-      FAIL() << name;
-    } catch (const Error& error) {
-      EXPECT_EQ(error.code(), ExitCode::kInput);
-      EXPECT_EQ(error.where(), folder_ + "/" + name);
-    }
+    EXPECT_REGRADE_ERROR(ListInputs(folder_ + "/" + name), ExitCode::kInput,
+                         folder_ + "/" + name + ": ");
   }
   EXPECT_EQ(PlannedInputs(ListInputs(folder_), {}),
             "2 files and 1 film (0.1 s), of which 40 to 120 frames are picked");

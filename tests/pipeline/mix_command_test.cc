@@ -5,8 +5,6 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
-#include <fstream>
-#include <iterator>
 
 #include "pipeline/fields/field_file.h"
 #include "pipeline/images/image_file.h"
@@ -20,13 +18,9 @@ namespace regrade {
 namespace {
 
 using testing::ProgramOutcome;
+using testing::ReadText;
 using testing::Regrade;
 using testing::TemporaryFolder;
-
-std::string Bytes(const std::string& path) {
-  std::ifstream file(path, std::ios::binary);
-  return {std::istreambuf_iterator<char>(file), {}};
-}
 
 // A scene whose colours know no direction has a style that does, and a film between the two.
 TEST(MixCommand, AStyleMayKnowDirectionsThatItsSceneDoesNot) {
@@ -49,7 +43,7 @@ TEST(MixCommand, AStyleMayKnowDirectionsThatItsSceneDoesNot) {
   EXPECT_GT(beyond, 0);
 
   ASSERT_EQ(Regrade({"mix", folder / "e", "--mix", "0:0.5:1", "--out", folder / "m"}).code, 0);
-  const auto frame = [&](const std::string& path) { return Bytes(folder / path); };
+  const auto frame = [&](const std::string& path) { return ReadText(folder / path); };
   EXPECT_EQ(frame("m/frames/00000.png"),
             frame("e/styles/style_sunset/frames/path_source/00000.png"));
   EXPECT_EQ(frame("m/frames/00002.png"),
@@ -71,7 +65,7 @@ TEST(MixCommand, H49_AFilmBetweenTheSceneAndItsStyle) {
   const ProgramOutcome mixed =
       Regrade({"mix", folder / "e", "--mix", "0:0.5:1", "--out", folder / "m"});
   ASSERT_EQ(mixed.code, 0) << mixed.text;
-  const auto frame = [&](const std::string& path) { return Bytes(folder / path); };
+  const auto frame = [&](const std::string& path) { return ReadText(folder / path); };
   EXPECT_EQ(frame("m/frames/00000.png"),
             frame("e/styles/style_sunset/frames/path_source/00000.png"));
   EXPECT_EQ(frame("m/frames/00002.png"),

@@ -93,13 +93,10 @@ double Change(const Image& a, const Image& b, const Image& mask, bool inside) {
 TEST(ObjectMasks, H50_ARunWithWrongMasksRestylesTheObjectAlone) {
   const TemporaryFolder folder;
   const std::string style = testing::SourceDir() + "/assets/style_sunset.png";
-  const auto regrade = [](const std::vector<std::string>& arguments) {
-    return testing::RunProgram(REGRADE_PROGRAM, arguments);
-  };
-  ASSERT_EQ(
-      regrade({"synth", folder / "s", "--views", "12", "--size", "96x72", "--effects", "masks"})
-          .code,
-      0);
+  ASSERT_EQ(testing::Regrade({"synth", folder / "s", "--views", "12", "--size", "96x72",
+                              "--effects", "masks"})
+                .code,
+            0);
   std::vector<std::string> run{"run",
                                folder / "s/truth",
                                "--style",
@@ -124,7 +121,7 @@ TEST(ObjectMasks, H50_ARunWithWrongMasksRestylesTheObjectAlone) {
                                "2",
                                "--tracks",
                                "given"};
-  const ProgramOutcome done = regrade(run);
+  const ProgramOutcome done = testing::Regrade(run);
   ASSERT_EQ(done.code, 0) << done.text;
   // View 2 was given a mask beside the ball, view 3 an empty one, view 5 a swollen one.
   double restyled = 0, spilled = 0;
@@ -150,15 +147,18 @@ TEST(ObjectMasks, H50_ARunWithWrongMasksRestylesTheObjectAlone) {
     std::snprintf(name, sizeof name, "%05d.png", i);
     WritePng8(folder / ("none/" + std::string(name)), Image(96, 72, 1));
   }
-  const ProgramOutcome empty = regrade({"stylize", folder / "e", "--masks", folder / "none"});
+  const ProgramOutcome empty =
+      testing::Regrade({"stylize", folder / "e", "--masks", folder / "none"});
   ASSERT_EQ(empty.code, 0) << empty.text;
   EXPECT_NE(empty.text.find("--mask-vote"), std::string::npos) << empty.text;
   const auto pixels = [&](const char* path) { return ReadImage(folder / path).pixels; };
   EXPECT_EQ(pixels("e/styles/style_sunset/frames/styled/00001.png"),
             pixels("e/styles/style_sunset/frames/source/00001.png"));
 
-  EXPECT_EQ(regrade({"stylize", folder / "e", "--masks", folder / "nowhere"}).code, 3);
-  EXPECT_EQ(regrade({"stylize", folder / "e", "--masks", "", "--style-mask", style}).code, 2);
+  EXPECT_EQ(testing::Regrade({"stylize", folder / "e", "--masks", folder / "nowhere"}).code, 3);
+  EXPECT_EQ(
+      testing::Regrade({"stylize", folder / "e", "--masks", "", "--style-mask", style}).code,
+      2);
 }
 
 }  // namespace

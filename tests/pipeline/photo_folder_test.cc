@@ -13,6 +13,7 @@
 #include "pipeline/capture/ingest_photos.h"
 #include "pipeline/files/atomic_file.h"
 #include "tests/pipeline/picture_corpus.h"
+#include "tests/support/expect_error.h"
 
 // Every read of this program comes by here: while this is set, drives are gone.
 static std::atomic<bool> drive_is_gone = false;
@@ -241,13 +242,8 @@ TEST_F(PhotoFolder, F13_MissingFileEmptyOrWithoutPhotos) {
   EXPECT_TRUE(Contains(none.what_failed(), "2 x not an image")) << none.what();
   EXPECT_TRUE(Contains(none.what_failed(), "JPEG XL is not supported")) << none.what();
   for (const char* bad : {"none", "photos/a.txt"}) {
-    try {
-      IngestPhotos(scratch_ / bad, staging_, {}, {});
-      FAIL();
-    } catch (const Error& error) {
-      EXPECT_EQ(error.code(), ExitCode::kInput);
-      EXPECT_TRUE(Contains(error.what_failed(), bad[0] == 'n' ? "no such folder" : "a file"));
-    }
+    EXPECT_REGRADE_ERROR(IngestPhotos(scratch_ / bad, staging_, {}, {}), ExitCode::kInput,
+                         bad[0] == 'n' ? "no such folder" : "a file");
   }
 }
 

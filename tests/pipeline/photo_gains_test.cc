@@ -234,9 +234,9 @@ TEST(KeepExposure, WhatFramesAreComparedWithHasTheirExposures) {
     ApplyGain(0.4, &photo);
     WritePng8(path, photo);
   }
-  const auto run = [](std::vector<std::string> words, const std::vector<std::string>& more) {
-    words.insert(words.end(), more.begin(), more.end());
-    const testing::ProgramOutcome done = testing::RunProgram(REGRADE_PROGRAM, words);
+  const auto run = [](const std::vector<std::string>& words,
+                      const std::vector<std::string>& more) {
+    const testing::ProgramOutcome done = testing::Regrade(words, more);
     ASSERT_EQ(done.code, 0) << done.text;
   };
   run({"run",        folder / "s",

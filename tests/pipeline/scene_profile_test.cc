@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "kernels/scene/facing.h"
 #include "pipeline/capture/working_views.h"
 #include "tests/support/expect_error.h"
 
@@ -102,9 +103,7 @@ Capture CaptureSeenAllRound(int far) {
     const Vec3d forward = Normalized(-center),
                 right = Normalized(Cross(forward, Vec3d{0, 0, 1}));
     RigidTransform& t = view.camera.camera_from_world;
-    t.rotation.row[0] = right, t.rotation.row[1] = Cross(forward, right);
-    t.rotation.row[2] = forward;
-    t.translation = -(t.rotation * center);
+    t = Facing(center, forward, right);
     capture.views.push_back(view);
     const auto add = [&](const Vec3d& position) {
       ScenePoint point;

@@ -5,12 +5,12 @@
 #include <algorithm>
 #include <cmath>
 
+#include "kernels/image/decibels.h"
 #include "kernels/image/resize.h"
 #include "kernels/splats/cpu/render_splats.h"
 #include "pipeline/images/image_file.h"
 #include "pipeline/splat_files/read_splats.h"
 #include "tests/support/data.h"
-#include "tests/support/psnr.h"
 
 namespace regrade {
 namespace {
@@ -68,7 +68,7 @@ TEST(SplatFiles, RealSplatsShowTheirPhoto) {
   seen.pixels.assign(picture.color.begin(), picture.color.end());
   const Image photo = WithoutLens(
       Resize(DecodePhoto(testing::DataPath("fox/images/0001.jpg")).image, 270, 480), camera);
-  const double psnr = testing::Psnr(seen, photo);
+  const double psnr = DecibelsBetween(seen, photo);
   RecordProperty("psnr", std::to_string(psnr));
   // 26.8 dB; the program that fitted the splats measured 30.2 dB over all photos held out.
   EXPECT_GT(psnr, 25);

@@ -9,8 +9,8 @@
 #include <string>
 #include <utility>
 
+#include "kernels/image/decibels.h"
 #include "kernels/render/field_renderer.h"
-#include "tests/support/psnr.h"
 #include "tests/support/small_field.h"
 
 namespace regrade {
@@ -68,8 +68,9 @@ double DbOnNewViews(const SplatsOfVoxels& fit, const StoredField& voxels,
   const std::vector<Camera> views = fit.MeasuredViews(voxels);
   double worst = 1e9;
   for (size_t i = 0; i < views.size(); ++i)
-    worst = std::min(worst, testing::Psnr(of_splats.Render(fit.MeasuredViews(splats)[i]).color,
-                                          of_voxels.Render(views[i]).color));
+    worst =
+        std::min(worst, DecibelsBetween(of_splats.Render(fit.MeasuredViews(splats)[i]).color,
+                                        of_voxels.Render(views[i]).color));
   return worst;
 }
 

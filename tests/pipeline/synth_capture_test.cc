@@ -20,6 +20,7 @@
 #include "pipeline/images/image_file.h"
 #include "pipeline/synth/synth_effects.h"
 #include "reconstruct/colmap/colmap_model.h"
+#include "tests/support/expect_error.h"
 #include "tests/support/threads.h"
 
 namespace regrade {
@@ -302,12 +303,7 @@ TEST_F(SynthCapture, RefusesUnknownEffectsScenesAndSizes) {
 TEST_F(SynthCapture, DoesNotMixWithOtherPhotos) {
   fs::create_directories(root_ / "mine" / "images");
   std::ofstream(root_ / "mine" / "images" / "holiday.jpg") << "x";
-  try {
-    Write("mine");
-    FAIL();
-  } catch (const Error& error) {
-    EXPECT_EQ(error.code(), ExitCode::kFolderInUse);
-  }
+  EXPECT_REGRADE_ERROR(Write("mine"), ExitCode::kFolderInUse, "");
   Write("other");
   EXPECT_THROW(Write("other", "noise"), Error);
 }

@@ -11,6 +11,7 @@
 #include "pipeline/images/video_reader.h"
 #include "pipeline/images/video_writer.h"
 #include "tests/pipeline/picture_corpus.h"
+#include "tests/support/expect_error.h"
 
 namespace regrade {
 namespace {
@@ -178,15 +179,8 @@ TEST(VideoFile, AFullDiskIsReportedAndTheOldFilmStays) {
   const auto handler = ::signal(SIGXFSZ, SIG_IGN);
   const rlimit small{4096, before.rlim_max};
   ::setrlimit(RLIMIT_FSIZE, &small);
-  try {
-    WriteFilm(scratch / "a.mp4", 320, 240, 10);
-    ADD_FAILURE() << "no error";
-  } catch (const Error& error) {
-    EXPECT_EQ(error.code(), ExitCode::kResources);
-    EXPECT_EQ(error.where(), scratch / "a.mp4");
-    EXPECT_TRUE(testing::Contains(error.what_failed(), "File too large"));
-    EXPECT_FALSE(error.hint().empty());
-  }
+  EXPECT_REGRADE_ERROR(WriteFilm(scratch / "a.mp4", 320, 240, 10), ExitCode::kResources,
+                       (scratch / "a.mp4") + ": ", "File too large", "(");
   ::setrlimit(RLIMIT_FSIZE, &before);
   ::signal(SIGXFSZ, handler);
   EXPECT_EQ(ReadBytes(scratch / "a.mp4"), "old");
@@ -201,12 +195,8 @@ TEST(VideoFile, AnUnfinishedMovieLeavesNothing) {
 
 TEST(VideoFile, AMissingFolderIsReported) {
   const ScratchFolder scratch;
-  try {
-    VideoWriter writer(scratch / "none/a.mp4", 64, 64, 24);
-    FAIL();
-  } catch (const Error& error) {
-    EXPECT_EQ(error.code(), ExitCode::kResources);
-  }
+  EXPECT_REGRADE_ERROR(VideoWriter(scratch / "none/a.mp4", 64, 64, 24), ExitCode::kResources,
+                       "");
 }
 
 TEST(VideoFile, WhatIsNoVideoCountsAsNone) {

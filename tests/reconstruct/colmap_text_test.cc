@@ -6,6 +6,7 @@
 #include <filesystem>
 
 #include "kernels/base/error.h"
+#include "tests/support/expect_error.h"
 #include "tests/support/synthetic_model.h"
 #include "tests/support/temporary_folder.h"
 
@@ -112,15 +113,8 @@ TEST_F(ColmapText, ModelsOfANewerColmap) {
     fs::remove(folder_ + "/" + name + ".bin");
   for (const char* lens : {"SIMPLE_FISHEYE", "RAD_TAN_THIN_PRISM_FISHEYE", "EUCM_2"}) {
     testing::WriteText(folder_ + "/cameras.txt", Concat("1 ", lens, " 640 480 600 320 240\n"));
-    try {
-      ReadColmapModel(folder_);
-      ADD_FAILURE() << lens;
-    } catch (const Error& error) {
-      EXPECT_EQ(error.where(), folder_ + "/cameras.txt");
-      EXPECT_NE(error.what_failed().find(lens), std::string::npos);
-      EXPECT_NE(error.what_failed().find("newer COLMAP"), std::string::npos);
-      EXPECT_NE(error.hint().find("OPENCV_FISHEYE"), std::string::npos);
-    }
+    EXPECT_REGRADE_ERROR(ReadColmapModel(folder_), ExitCode::kInput,
+                         folder_ + "/cameras.txt: ", lens, "newer COLMAP", "OPENCV_FISHEYE");
   }
   testing::WriteText(folder_ + "/cameras.txt", "1 P!NHOLE 640 480 600 320 240\n");
   EXPECT_NE(Refusal().find("damaged"), std::string::npos);

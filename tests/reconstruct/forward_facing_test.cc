@@ -132,13 +132,7 @@ TEST(ForwardFacing, H89_ACameraThatLooksBackIsNamed) {
         -backward.camera_from_world.rotation.row[axis];
   backward.camera_from_world.translation = -(backward.camera_from_world.rotation * center);
   ForwardFacing measured = MeasureForwardFacing(WallCapture(10, 0.05));
-  try {
-    NormalizeForwardFacing(capture, measured);
-    FAIL() << "not refused";
-  } catch (const Error& error) {
-    EXPECT_EQ(error.code(), ExitCode::kScene);
-    EXPECT_EQ(error.where(), "photo5");
-  }
+  EXPECT_REGRADE_ERROR(NormalizeForwardFacing(capture, measured), ExitCode::kScene, "photo5: ");
 }
 
 TEST(ForwardFacing, H90_ARayThatDoesNotRunForwardMissesTheField) {

@@ -11,8 +11,8 @@
 #include "kernels/base/error.h"
 #include "kernels/field/cpu/render_view.h"
 #include "kernels/field/render.h"
+#include "kernels/image/decibels.h"
 #include "reconstruct/fit/fit_field.h"
-#include "tests/support/psnr.h"
 #include "tests/support/small_field.h"
 #include "tests/support/threads.h"
 
@@ -67,7 +67,7 @@ class FitField : public ::testing::Test {
   }
 
   double HeldOutPsnr(const RadianceField& field) const {
-    return Psnr(RenderView(field, cameras_[0], {0.5f, 1e-4f}).color, photos_[0]);
+    return DecibelsBetween(RenderView(field, cameras_[0], {0.5f, 1e-4f}).color, photos_[0]);
   }
 
   FitResult Fit(const FitHooks& hooks = {}) const {

@@ -13,6 +13,7 @@
 #include "kernels/field/spherical_harmonics.h"
 #include "kernels/field/trilinear.h"
 #include "kernels/network/lipschitz_layer.h"
+#include "kernels/scene/facing.h"
 #include "stylize/field/apply_network.h"
 #include "stylize/field/base_map.h"
 #include "stylize/field/gradient_aggregation.h"
@@ -77,10 +78,7 @@ inline std::vector<Camera> Ring(int views, int size) {
     camera.width = camera.height = size;
     camera.fx = camera.fy = 1.3 * size;
     camera.cx = camera.cy = 0.5 * size;
-    camera.camera_from_world.rotation.row[0] = right;
-    camera.camera_from_world.rotation.row[1] = Cross(forward, right);
-    camera.camera_from_world.rotation.row[2] = forward;
-    camera.camera_from_world.translation = -(camera.camera_from_world.rotation * center);
+    camera.camera_from_world = Facing(center, forward, right);
     cameras.push_back(camera);
   }
   return cameras;

@@ -4,36 +4,10 @@
 #include <string>
 #include <vector>
 
-#include "kernels/process/child_process.h"
 #include "pipeline/synth/synth_capture.h"
+#include "tests/support/run_program.h"
 
 namespace regrade::testing {
-
-struct ProgramOutcome {
-  int code = 0;
-  std::string text;
-};
-
-inline ProgramOutcome RunProgram(const std::string& program,
-                                 const std::vector<std::string>& arguments) {
-  ChildOptions options;
-  options.argv = {program};
-  options.argv.insert(options.argv.end(), arguments.begin(), arguments.end());
-  options.wall_limit_s = 300;
-  ProgramOutcome outcome;
-  const ChildResult result =
-      RunChild(options, [&outcome](const std::string& line) { outcome.text += line + "\n"; });
-  outcome.code = result.end == ChildEnd::kExited ? result.exit_status : 128 + result.signal;
-  return outcome;
-}
-
-inline ProgramOutcome Regrade(const std::vector<std::string>& arguments) {
-  return RunProgram(REGRADE_PROGRAM, arguments);
-}
-
-inline int ExitCodeOf(const std::vector<std::string>& arguments) {
-  return Regrade(arguments).code;
-}
 
 // `regrade synth`, without a start of the program.
 inline void WriteCapture(const std::string& folder, int views, const std::string& size) {
