@@ -12,6 +12,7 @@
 #include "kernels/synthetic/ray_trace.h"
 #include "kernels/synthetic/solid_index.h"
 #include "tests/support/expect_error.h"
+#include "tests/support/pinhole.h"
 #include "tests/support/threads.h"
 
 namespace regrade {
@@ -212,10 +213,7 @@ TEST(SyntheticScene, VisibleMeansUnoccluded) {
   ball.center = {0, 0, 0};
   ball.half = {0.4, 0, 0};
   scene.solids = {wall, ball};
-  Camera from;
-  from.width = from.height = 100;
-  from.fx = from.fy = 100;
-  from.cx = from.cy = 50;
+  Camera from = testing::PinholeOf(100, 100, 100);
   from.camera_from_world.rotation.row[0] = {1, 0, 0};
   from.camera_from_world.rotation.row[1] = {0, 0, -1};
   from.camera_from_world.rotation.row[2] = {0, 1, 0};

@@ -337,17 +337,15 @@ TEST_F(ColmapNames, AnExactNameComesFirst) {
 
 TEST_F(ColmapNames, TheUsersNamesAreTold) {
   std::vector<std::string> notes;
-  try {
+  const Error error = testing::ErrorFrom([&] {
     Import({"shot_0001.png"}, {"shot0001.jpg", "other.jpg", "more.jpg"}, &notes);
-    FAIL() << "accepted";
-  } catch (const Error& error) {
-    EXPECT_EQ(error.code(), ExitCode::kInput);
-    EXPECT_EQ(error.where(), root_ + "/sparse");
-    const std::string what = error.what();
-    EXPECT_NE(what.find("\"shot_0001.png\""), std::string::npos) << what;
-    EXPECT_NE(what.find("\"shot0001.jpg\""), std::string::npos) << what;
-    EXPECT_EQ(what.find("absent/"), std::string::npos) << what;
-  }
+  });
+  EXPECT_EQ(error.code(), ExitCode::kInput);
+  EXPECT_EQ(error.where(), root_ + "/sparse");
+  const std::string what = error.what();
+  EXPECT_NE(what.find("\"shot_0001.png\""), std::string::npos) << what;
+  EXPECT_NE(what.find("\"shot0001.jpg\""), std::string::npos) << what;
+  EXPECT_EQ(what.find("absent/"), std::string::npos) << what;
 }
 
 TEST(ListedPictures, FarNamesAreRefusedBeforeTheDiskIsAsked) {

@@ -178,10 +178,9 @@ TEST(EvaluateCommand, AProtocolSetsModeAndGaps) {
   WriteFrames(folder / "source", 6);
   WriteFrames(folder / "styled", 6, 0.03f);
   const auto evaluate = [&](const std::vector<std::string>& more, const std::string& out) {
-    std::vector<std::string> words{"--frames",        folder / "styled", "--reference",
-                                   folder / "source", "--out",           folder / out};
-    words.insert(words.end(), more.begin(), more.end());
-    return Evaluate(words);
+    return Evaluate(testing::Joined({"--frames", folder / "styled", "--reference",
+                                     folder / "source", "--out", folder / out},
+                                    more));
   };
   const ProgramOutcome named = evaluate({"--protocol", "liprf"}, "named");
   ASSERT_EQ(named.code, 0) << named.text;

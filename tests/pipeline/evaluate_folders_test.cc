@@ -8,20 +8,13 @@
 
 #include "evaluate/flow_file.h"
 #include "pipeline/files/json_file.h"
-#include "pipeline/synth/synth_capture.h"
 #include "tests/support/evaluated_frames.h"
+#include "tests/support/tiny_run.h"
 
 namespace regrade {
 namespace {
 
 using namespace regrade::testing;
-
-JsonValue Row(const JsonValue& report, const std::string& sequence, int gap = 1) {
-  for (const JsonValue& row : report.At("consistency").AsArray())
-    if (row.At("sequence").AsString() == sequence && row.At("gap").AsInt() == gap) return row;
-  ADD_FAILURE() << "no row of " << sequence << " at gap " << gap;
-  return {};
-}
 
 // The same frames under numbers that overlap: each is compared with its own moment.
 TEST(EvaluateFolders, FramesOfOtherMomentsArePairedByNumber) {
@@ -39,11 +32,11 @@ TEST(EvaluateFolders, FramesOfOtherMomentsArePairedByNumber) {
   EXPECT_EQ(pairing.At("by").AsString(), "number");
   EXPECT_EQ(pairing.At("left_out").AsArray().at(0).AsString(), "take2_6.png");
   EXPECT_EQ(pairing.At("reference_left_out").AsArray().at(0).AsString(), "00000.png");
-  EXPECT_EQ(Row(report, "styled").At("pairs").AsInt(), 4);
+  EXPECT_EQ(RowOf(report, "styled").At("pairs").AsInt(), 4);
   for (const JsonValue& row : report.At("fidelity").AsArray())
     EXPECT_TRUE(row.At("psnr_to_2d_db_infinite").AsBool()) << DumpJson(row);
-  EXPECT_EQ(Row(report, "styled").At("tc_psnr_mean_db").AsDouble(),
-            Row(report, "source").At("tc_psnr_mean_db").AsDouble());
+  EXPECT_EQ(RowOf(report, "styled").At("tc_psnr_mean_db").AsDouble(),
+            RowOf(report, "source").At("tc_psnr_mean_db").AsDouble());
 }
 
 // Flow files are called by the numbers of the reference's frames or by their places in its
@@ -69,7 +62,7 @@ TEST(EvaluateFolders, FlowFilesBelongToTheirFrames) {
         Evaluate({"--frames", folder / "styled", "--reference", folder / "source", "--gaps",
                   "1", "--flow", "files:" + (folder / name), "--out", folder / "out"});
     EXPECT_EQ(outcome.code, 0) << outcome.text;
-    const JsonValue row = Row(ReadJsonFile(folder / "out/report.json"), "styled");
+    const JsonValue row = RowOf(ReadJsonFile(folder / "out/report.json"), "styled");
     EXPECT_EQ(row.At("undefined_pairs").AsInt(), 0);
     return row.At("coverage").AsDouble();
   };
@@ -86,11 +79,9 @@ TEST(EvaluateFolders, SeveralFoldersAreComparedPairByPair) {
   WriteFrames(folder / "a", 6, 0.01f);
   WriteFrames(folder / "b", 6, 0.03f);
   const auto evaluate = [&](const std::vector<std::string>& more) {
-    std::vector<std::string> words{"--frames",    folder / "a",      folder / "b",
-                                   "--reference", folder / "source", "--gaps",
-                                   "1",           "--out",           folder / "out"};
-    words.insert(words.end(), more.begin(), more.end());
-    return Evaluate(words);
+    return Evaluate(testing::Joined({"--frames", folder / "a", folder / "b", "--reference",
+                                     folder / "source", "--gaps", "1", "--out", folder / "out"},
+                                    more));
   };
   const ProgramOutcome outcome = evaluate({"--label", "Ours", "Other & co", "--table", "latex",
                                            "--require", "styled-2:tc-psnr:1<=90"});
@@ -99,7 +90,7 @@ TEST(EvaluateFolders, SeveralFoldersAreComparedPairByPair) {
   EXPECT_SAYS(outcome, "\nOther \\& co & 1 & 5 & ");
   const JsonValue report = ReadJsonFile(folder / "out/report.json");
   EXPECT_EQ(report.At("labels").At("styled_2").AsString(), "Other & co");
-  const JsonValue ours = Row(report, "styled"), other = Row(report, "styled_2");
+  const JsonValue ours = RowOf(report, "styled"), other = RowOf(report, "styled_2");
   EXPECT_EQ(ours.Find("tc_psnr_difference_db"), nullptr);
   EXPECT_EQ(other.At("difference_pairs").AsInt(), 5);
   const double difference = other.At("tc_psnr_difference_db").AsDouble();
@@ -147,16 +138,11 @@ TEST(EvaluateFolders, RequirementsBecomeTestCases) {
 // that of its flow files.
 TEST(EvaluateFolders, MotionFromCamerasAndDepth) {
   const TemporaryFolder folder;
-  SynthOptions synth;
-  synth.views = 7;
-  synth.size = "64x48";
-  WriteSyntheticCapture(folder / "s", synth);
+  WriteCapture(folder / "s", 7, "64x48");
   const auto evaluate = [&](const std::vector<std::string>& more, const std::string& out) {
-    std::vector<std::string> words{"--frames",    folder / "s/images",
-                                   "--reference", folder / "s/images",
-                                   "--out",       folder / out};
-    words.insert(words.end(), more.begin(), more.end());
-    return Evaluate(words);
+    return Evaluate(testing::Joined({"--frames", folder / "s/images", "--reference",
+                                     folder / "s/images", "--out", folder / out},
+                                    more));
   };
   const ProgramOutcome exact =
       evaluate({"--protocol", "geometry", "--poses", folder / "s/truth/transforms.json",
@@ -170,13 +156,13 @@ TEST(EvaluateFolders, MotionFromCamerasAndDepth) {
                   b = ReadJsonFile(folder / "flow/report.json");
   EXPECT_EQ(a.At("stages").At("evaluate").At("protocol").AsString(), "geometry");
   for (const int gap : {1, 5}) {
-    EXPECT_GT(Row(a, "styled", gap).At("coverage").AsDouble(), gap == 1 ? 0.4 : 0.05);
+    EXPECT_GT(RowOf(a, "styled", gap).At("coverage").AsDouble(), gap == 1 ? 0.4 : 0.05);
     // Both compare all pixels of which the flow stays in the frame.
-    EXPECT_NEAR(Row(a, "styled", gap).At("tc_psnr_unmasked_mean_db").AsDouble(),
-                Row(b, "styled", gap).At("tc_psnr_unmasked_mean_db").AsDouble(), 0.05);
+    EXPECT_NEAR(RowOf(a, "styled", gap).At("tc_psnr_unmasked_mean_db").AsDouble(),
+                RowOf(b, "styled", gap).At("tc_psnr_unmasked_mean_db").AsDouble(), 0.05);
     // The mask leaves out what is hidden.
-    EXPECT_GT(Row(a, "styled", gap).At("tc_psnr_mean_db").AsDouble(),
-              Row(a, "styled", gap).At("tc_psnr_unmasked_mean_db").AsDouble() + 0.5);
+    EXPECT_GT(RowOf(a, "styled", gap).At("tc_psnr_mean_db").AsDouble(),
+              RowOf(a, "styled", gap).At("tc_psnr_unmasked_mean_db").AsDouble() + 0.5);
   }
   std::filesystem::remove(folder / "s/truth/depth/00003.npy");
   const ProgramOutcome missing =

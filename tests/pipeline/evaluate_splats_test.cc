@@ -13,13 +13,13 @@
 #include "pipeline/splat_files/read_splats.h"
 #include "pipeline/splat_files/splat_ply.h"
 #include "pipeline/stages/foreign_splats.h"
-#include "pipeline/synth/synth_capture.h"
 #include "reconstruct/colmap/colmap_model.h"
 #include "tests/support/evaluated_frames.h"
 #include "tests/support/expect_error.h"
 #include "tests/support/source_dir.h"
 #include "tests/support/splat_ball.h"
 #include "tests/support/splat_bytes.h"
+#include "tests/support/tiny_run.h"
 
 namespace regrade {
 namespace {
@@ -92,13 +92,6 @@ class EvaluateSplatFiles : public ::testing::Test {
     return ReadJsonFile(folder_ / (out + "/report.json"));
   }
 
-  static JsonValue RowOf(const JsonValue& report, const std::string& sequence, int gap = 1) {
-    for (const JsonValue& row : report.At("consistency").AsArray())
-      if (row.At("sequence").AsString() == sequence && row.At("gap").AsInt() == gap) return row;
-    ADD_FAILURE() << "no row of " << sequence << " at gap " << gap;
-    return {};
-  }
-
   TemporaryFolder folder_;
   Splats plain_;
 };
@@ -131,8 +124,7 @@ TEST_F(EvaluateSplatFiles, MotionIsThatOfTheReferencesDepth) {
     return FrameSource{kShots, [pictures](int i) { return pictures[static_cast<size_t>(i)]; }};
   };
   const FrameSource plain = frames("plain.ply"), strong = frames("strong.ply");
-  ConsistencyOptions options;
-  options.mode = "geometry";
+  ConsistencyOptions options{.mode = "geometry"};
   const ConsistencyReport expected = EvaluateConsistency(
       plain, {{"source", plain}, {"styled", strong}}, options, {}, [&](int i) {
         return FrameGeometry{depth[static_cast<size_t>(i)],
@@ -166,13 +158,10 @@ TEST_F(EvaluateSplatFiles, MotionIsThatOfTheReferencesDepth) {
 // where it gives the cameras, and else black.
 TEST_F(EvaluateSplatFiles, TheBackgroundIsChosen) {
   const auto corner = [&](const std::string& cameras, const std::vector<std::string>& more) {
-    std::vector<std::string> words{"--splats",    folder_ / "weak.ply",
-                                   "--reference", folder_ / "plain.ply",
-                                   "--cameras",   cameras,
-                                   "--gaps",      "1",
-                                   "--out",       folder_ / "out"};
-    words.insert(words.end(), more.begin(), more.end());
-    const ProgramOutcome outcome = Evaluate(words);
+    const ProgramOutcome outcome = Evaluate(
+        testing::Joined({"--splats", folder_ / "weak.ply", "--reference", folder_ / "plain.ply",
+                         "--cameras", cameras, "--gaps", "1", "--out", folder_ / "out"},
+                        more));
     EXPECT_EQ(outcome.code, 0) << outcome.text;
     const Image frame = ReadImage(folder_ / "out/rendered/styled/00003.png");
     return Vec3f{frame.at(0, 0)[0], frame.at(0, 0)[1], frame.at(0, 0)[2]};
@@ -315,10 +304,7 @@ TEST_F(EvaluateSplatFiles, WhatIsNoSceneIsRefused) {
 // Captures whose photos are there give the same cameras as their files, in the photos' order.
 TEST(CaptureCameras, PhotosMayBeThere) {
   const TemporaryFolder folder;
-  SynthOptions synth;
-  synth.views = 11;
-  synth.size = "96x72";
-  WriteSyntheticCapture(folder / "s", synth);
+  testing::WriteCapture(folder / "s", 11, "96x72");
   const TransformsFile truth = ReadTransformsJson(folder / "s/truth/transforms.json");
   const auto expect_truth = [&](const std::string& capture) {
     const std::vector<BareCamera> cameras = CamerasOfCapture(capture, {});

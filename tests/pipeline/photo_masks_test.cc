@@ -49,11 +49,9 @@ void SynthWithAThing(const TemporaryFolder& folder) {
 
 void Reconstruct(const std::string& capture, const std::string& out, const std::string& steps,
                  std::vector<std::string> more) {
-  std::vector<std::string> words = {"reconstruct",   capture, "--out",    out,
-                                    "--tracks",      "given", "--splats", "4",
-                                    "--splat-steps", steps};
-  words.insert(words.end(), more.begin(), more.end());
-  Said(words);
+  Said(testing::Joined({"reconstruct", capture, "--out", out, "--tracks", "given", "--splats",
+                        "4", "--splat-steps", steps},
+                       more));
 }
 
 double HeldOutPsnr(const std::string& out) {

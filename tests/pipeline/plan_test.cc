@@ -13,11 +13,7 @@ const SceneBox kCube;
 constexpr uint64_t kProgram = static_cast<uint64_t>(kProgramBytes);
 
 FitOptions Fit(const std::vector<int>& resolutions, const std::vector<int>& steps) {
-  FitOptions options;
-  options.resolutions = resolutions;
-  options.steps = steps;
-  options.rays_per_step = 10500;
-  return options;
+  return {.resolutions = resolutions, .steps = steps, .rays_per_step = 10500};
 }
 
 TEST(Plan, MemoryOfOneStageByHand) {
@@ -184,8 +180,7 @@ TEST(Plan, PhotosAreThinnedToMemory) {
 
 // A splat for each 15 pixels is enough.
 TEST(Plan, FewPixelsHaveFewSplats) {
-  SplatFitOptions asked;
-  asked.thousands = 100;
+  SplatFitOptions asked{.thousands = 100};
   EXPECT_EQ(SplatsWithinMemory(asked, {.pixels = 600000, .photos = 4}).options.thousands, 40);
 }
 

@@ -29,14 +29,6 @@ using testing::TemporaryFolder;
 
 constexpr int kViews = 12;
 
-bool HaveColmap() {
-  try {
-    return RunChild({.argv = {"colmap", "help"}}).Succeeded();
-  } catch (const Error&) {
-    return false;
-  }
-}
-
 void Synth(const std::string& out, const std::string& effects) {
   std::vector<std::string> words = {"synth",  out,      "--views", std::to_string(kViews),
                                     "--size", "280x210"};
@@ -85,7 +77,7 @@ TEST(PoseTracks, NotForTransparentPhotosOrGivenPoints) {
 
 // A drift of +-30 %, poses in a transforms.json, no points.
 TEST(PoseTracks, ExposureOfGivenPosesIsFoundWithinTwoPerCent) {
-  if (!HaveColmap()) GTEST_SKIP() << "no colmap here";
+  if (!testing::HaveColmap()) GTEST_SKIP() << "no colmap here";
   const TemporaryFolder folder;
   Synth(folder / "s", "exposure");
   Said({"pose", folder / "s/truth", "--out", folder / "out"});
@@ -110,7 +102,7 @@ TEST(PoseTracks, ExposureOfGivenPosesIsFoundWithinTwoPerCent) {
 
 // Poses of the right photos in the wrong order: COLMAP finds points for them, by chance.
 TEST(PoseTracks, PosesOfOtherPhotosAreRejected) {
-  if (!HaveColmap()) GTEST_SKIP() << "no colmap here";
+  if (!testing::HaveColmap()) GTEST_SKIP() << "no colmap here";
   const TemporaryFolder folder;
   Synth(folder / "s", "");
   const std::string path = folder / "s/truth/transforms.json";
@@ -130,7 +122,7 @@ TEST(PoseTracks, PosesOfOtherPhotosAreRejected) {
 // Masks by the names of photos, with their extension or without, of half the size: what they
 // blacken is not matched.
 TEST(PoseTracks, MaskedPixelsAreNotMatched) {
-  if (!HaveColmap()) GTEST_SKIP() << "no colmap here";
+  if (!testing::HaveColmap()) GTEST_SKIP() << "no colmap here";
   const TemporaryFolder folder;
   Synth(folder / "s", "");
   fs::create_directories(folder / "masks");
@@ -169,7 +161,7 @@ TEST(PoseTracks, MaskedPixelsAreNotMatched) {
 
 // Poses 0.3 degrees and 0.5 % of the spread off, handed over without their tracks.
 TEST(PoseTracks, PerturbedPosesAreRefined) {
-  if (!HaveColmap()) GTEST_SKIP() << "no colmap here";
+  if (!testing::HaveColmap()) GTEST_SKIP() << "no colmap here";
   const TemporaryFolder folder;
   Synth(folder / "s", "poses");
   Said({"pose", folder / "s", "--out", folder / "off", "--effects", "pose-refinement=off"});

@@ -60,8 +60,7 @@ TEST(SplatFiles, RealSplatsShowTheirPhoto) {
   const Vec3d center{-0.027891476255964984, -0.7842593389297035, 1.140255089311304};
   camera.camera_from_world.rotation = world_from_camera.Transposed();
   camera.camera_from_world.translation = -(camera.camera_from_world.rotation * center);
-  SplatOptions options;
-  options.near_plane = 0.01;
+  SplatOptions options{.near_plane = 0.01};
   const SplatPicture<float> picture =
       RenderSplats(MakeSplatFrame(scene.splats.view(), camera, options));
   Image seen(camera.width, camera.height);

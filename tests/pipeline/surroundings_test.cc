@@ -79,8 +79,7 @@ TEST(Surroundings, F27_TheCurrentFolderWasDeleted) {
   };
   const ProgramOutcome relative = run_gone("out");
   EXPECT_EQ(relative.code, 5) << relative.text;
-  EXPECT_NE(relative.text.find("the current folder does not exist"), std::string::npos)
-      << relative.text;
+  EXPECT_SAYS(relative, "the current folder does not exist");
   EXPECT_EQ(run_gone(folder / "out").code, 0);
 }
 

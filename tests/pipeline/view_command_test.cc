@@ -94,15 +94,13 @@ std::map<std::string, std::string> OtherFiles(const std::string& folder) {
 
 TEST(ViewCommand, ADroppedPictureBecomesAStyleAndAPathTheFilmOfRender) {
   const TemporaryFolder folder;
-  ASSERT_EQ(testing::Regrade({"synth", folder / "s", "--views", "6", "--size", "96x72"}).code,
-            0);
+  testing::Said({"synth", folder / "s", "--views", "6", "--size", "96x72"});
   std::vector<std::string> reconstruct{"reconstruct", folder / "s/truth", "--out",
                                        folder / "e"};
   for (const std::string& flag : testing::TinyFlags()) reconstruct.push_back(flag);
   // So long that the style can be watched: its network comes every 50 steps.
   *std::next(std::ranges::find(reconstruct, "--style-steps")) = "250";
-  const testing::ProgramOutcome made = testing::Regrade(reconstruct);
-  ASSERT_EQ(made.code, 0) << made.text;
+  testing::Said(reconstruct);
   const auto before = OtherFiles(folder / "");
 
   // The address comes before the scene, whose fit may still be at work, and the page with it.

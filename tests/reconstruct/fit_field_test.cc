@@ -202,9 +202,7 @@ TEST(DelayFactor, RisesFromAHundredthToOne) {
 
 // Frames and styles march on where the fit stopped early, and no less far than it did.
 TEST(MarchOfField, NoRayOfTheFitEndsLater) {
-  FitOptions fit;
-  fit.step = 0.75f;
-  fit.stop_transmittance = 1e-3f;
+  FitOptions fit{.step = 0.75f, .stop_transmittance = 1e-3f};
   EXPECT_EQ(MarchOfField(fit).step, 0.75f);
   EXPECT_EQ(MarchOfField(fit).stop_transmittance, 1e-4f);
   fit.stop_transmittance = 1e-7f;

@@ -43,8 +43,7 @@ class Tracks : public ::testing::Test {
                    const ProgressFunction& progress = {}) {
     const std::string link = folder_ / ("colmap-" + behaviour);
     if (!fs::exists(fs::symlink_status(link))) fs::create_symlink(FAKE_COLMAP, link);
-    PoseOptions options;
-    options.colmap = link;
+    PoseOptions options{.colmap = link};
     return TracksForPoses(posed, Photos(), options, folder_ / "work", progress);
   }
 

@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "pipeline/files/json_file.h"
 #include "pipeline/images/image_file.h"
 #include "tests/support/run_program.h"
 #include "tests/support/temporary_folder.h"
@@ -13,6 +14,14 @@ namespace regrade::testing {
 
 inline ProgramOutcome Evaluate(const std::vector<std::string>& arguments) {
   return Regrade({"evaluate"}, arguments);
+}
+
+// The consistency of a sequence in a report.
+inline JsonValue RowOf(const JsonValue& report, const std::string& sequence, int gap = 1) {
+  for (const JsonValue& row : report.At("consistency").AsArray())
+    if (row.At("sequence").AsString() == sequence && row.At("gap").AsInt() == gap) return row;
+  ADD_FAILURE() << "no row of " << sequence << " at gap " << gap;
+  return {};
 }
 
 // A wave that moves by a pixel per frame.

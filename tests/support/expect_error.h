@@ -1,5 +1,4 @@
-// EXPECT that a statement throws Error with a code, and that its message contains each of some
-// texts.
+// Errors that are expected.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -9,6 +8,23 @@
 
 #include "kernels/base/error.h"
 
+namespace regrade::testing {
+
+// The error that `body` throws; one of kDone if it returns.
+template <typename Body>
+Error ErrorFrom(const Body& body) {
+  try {
+    body();
+  } catch (const Error& error) {
+    return error;
+  }
+  return Error(ExitCode::kDone, "");
+}
+
+}  // namespace regrade::testing
+
+// EXPECT that a statement throws Error with a code, and that its message contains each of some
+// texts.
 #define EXPECT_REGRADE_ERROR(statement, expected_code, ...)                                    \
   do {                                                                                         \
     try {                                                                                      \

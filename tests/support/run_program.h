@@ -3,9 +3,12 @@
 
 #include <gtest/gtest.h>
 
+#include <iterator>
+#include <sstream>
 #include <string>
 #include <vector>
 
+#include "kernels/base/error.h"
 #include "kernels/process/child_process.h"
 
 #define EXPECT_SAYS(outcome, part) \
@@ -17,6 +20,18 @@ struct ProgramOutcome {
   int code = 0;
   std::string text;
 };
+
+// The words of a line.
+inline std::vector<std::string> Words(const std::string& line) {
+  std::istringstream words(line);
+  return {std::istream_iterator<std::string>(words), {}};
+}
+
+inline std::vector<std::string> Joined(std::vector<std::string> words,
+                                       const std::vector<std::string>& more) {
+  words.insert(words.end(), more.begin(), more.end());
+  return words;
+}
 
 inline ProgramOutcome RunProgram(const std::string& program,
                                  const std::vector<std::string>& arguments) {
@@ -31,11 +46,18 @@ inline ProgramOutcome RunProgram(const std::string& program,
   return outcome;
 }
 
+inline bool HaveColmap() {
+  try {
+    return RunProgram("colmap", {"help"}).code == 0;
+  } catch (const Error&) {
+    return false;
+  }
+}
+
 #ifdef REGRADE_PROGRAM
-inline ProgramOutcome Regrade(std::vector<std::string> arguments,
+inline ProgramOutcome Regrade(const std::vector<std::string>& arguments,
                               const std::vector<std::string>& more = {}) {
-  arguments.insert(arguments.end(), more.begin(), more.end());
-  return RunProgram(REGRADE_PROGRAM, arguments);
+  return RunProgram(REGRADE_PROGRAM, Joined(arguments, more));
 }
 
 inline int ExitCodeOf(const std::vector<std::string>& arguments) {

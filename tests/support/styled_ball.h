@@ -23,6 +23,7 @@
 #include "stylize/training/initial_network.h"
 #include "stylize/training/style_rays.h"
 #include "stylize/training/train_network.h"
+#include "tests/support/pinhole.h"
 #include "tests/support/threads.h"
 
 namespace regrade::testing {
@@ -74,10 +75,7 @@ inline std::vector<Camera> Ring(int views, int size) {
     const Vec3d center{2.2 * std::cos(a), 2.2 * std::sin(a), 0.4 * std::sin(2 * a)};
     const Vec3d forward = Normalized(-center);
     const Vec3d right = Normalized(Cross(forward, Vec3d{0, 0, 1}));
-    Camera camera;
-    camera.width = camera.height = size;
-    camera.fx = camera.fy = 1.3 * size;
-    camera.cx = camera.cy = 0.5 * size;
+    Camera camera = PinholeOf(size, size, 1.3 * size);
     camera.camera_from_world = Facing(center, forward, right);
     cameras.push_back(camera);
   }

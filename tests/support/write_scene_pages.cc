@@ -31,6 +31,7 @@
 #include "stylize/image/monge_kantorovich.h"
 #include "stylize/training/initial_network.h"
 #include "tests/support/keyframes.h"
+#include "tests/support/pinhole.h"
 #include "tests/support/small_field.h"
 #include "tests/support/small_splats.h"
 
@@ -40,10 +41,7 @@ namespace {
 constexpr int kWidth = 48, kHeight = 36;
 
 Camera LookingAt(const Vec3d& eye, const Vec3d& at, double focal) {
-  Camera camera;
-  camera.width = kWidth, camera.height = kHeight;
-  camera.fx = camera.fy = focal;
-  camera.cx = kWidth / 2.0, camera.cy = kHeight / 2.0;
+  Camera camera = testing::PinholeOf(kWidth, kHeight, focal);
   const Vec3d ahead = Normalized(at - eye), right = Normalized(Cross(ahead, {0, 0, 1}));
   camera.camera_from_world = Facing(eye, ahead, right);
   return camera;
