@@ -38,6 +38,26 @@ struct PairResult {
   int64_t flow_not_finite = 0, out_of_frame = 0, disoccluded = 0, motion_boundary = 0;
   int64_t colour_not_finite = 0;  // excluded: a colour of this sequence is NaN or inf
   bool above_8bit_floor = false;  // the error per channel is below that of 8-bit frames
+
+  // For JSON, as of FidelityRow.
+  template <typename Visit>
+  void Describe(Visit& visit) {
+    const char* why = error ? "" : "no pixel can be compared";
+    int gap = to - from;  // written for readers of the file
+    visit("sequence", sequence);
+    visit("gap", gap);
+    visit("from", from);
+    visit("to", to);
+    visit.OrNull("error", error, why);
+    visit.OrNull("tc_psnr_db", psnr_db, why);
+    visit("coverage", coverage);
+    visit("low_coverage", low_coverage);
+    visit("flow_not_finite", flow_not_finite);
+    visit("out_of_frame", out_of_frame);
+    visit("disoccluded", disoccluded);
+    visit("motion_boundary", motion_boundary);
+    visit("colour_not_finite", colour_not_finite);
+  }
 };
 
 // What a sequence has more than another one, over the pairs of frames that both have.

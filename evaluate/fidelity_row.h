@@ -1,4 +1,5 @@
-// What fidelity.h measures, as plain data.
+// What fidelity.h measures, as plain data; its JSON is made by
+// pipeline/workspace/metrics_json.h.
 #pragma once
 
 #include <optional>
@@ -34,6 +35,20 @@ struct FidelityRow {
 
   // Mean over frames of the SSIM of edge maps with the unstyled frame's, see EQ(ssim).
   std::optional<double> edge_ssim;
+
+  template <typename Visit>
+  void Describe(Visit& visit) {
+    visit("sequence", sequence);
+    visit.OrNull("psnr_to_2d_db", psnr_to_2d_db);
+    visit("lpips_to_2d", lpips_to_2d);
+    visit("structure", structure);
+    visit.OrNull("hue_std", hue_std);
+    visit.OrNull("hue_std_2d", hue_std_2d);
+    visit.OrNull("chroma", chroma);
+    visit.OrNull("chroma_2d", chroma_2d);
+    visit.OrNull("sliced_wasserstein_to_style", sliced_wasserstein_to_style);
+    visit("edge_ssim", edge_ssim);
+  }
 };
 
 }  // namespace regrade

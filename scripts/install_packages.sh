@@ -7,7 +7,7 @@ set -euo pipefail
 
 packages=(
   g++ cmake ninja-build pkg-config python3   # to build
-  libgtest-dev libbenchmark-dev python3-numpy python3-pil   # to test and to measure
+  libgtest-dev python3-numpy python3-pil   # to test and to measure
   libboost-program-options-dev               # command line
   libboost-dev                               # the local server (Beast), checksums
   libcurl4-openssl-dev libssl-dev            # fetching a network, SHA-256

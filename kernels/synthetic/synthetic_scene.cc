@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "kernels/base/error.h"
+#include "kernels/scene/facing.h"
 #include "kernels/synthetic/scene_builder.h"
 #include "kernels/synthetic/street_scene.h"
 
@@ -165,10 +166,7 @@ Camera LookAt(const Vec3d& center, const Vec3d& target, double focal_over_width,
   camera.cy = 0.5 * height;
   const Vec3d forward = Normalized(target - center);
   const Vec3d right = Normalized(Cross(forward, Vec3d{0, 0, 1}));
-  camera.camera_from_world.rotation.row[0] = right;
-  camera.camera_from_world.rotation.row[1] = Cross(forward, right);  // down
-  camera.camera_from_world.rotation.row[2] = forward;
-  camera.camera_from_world.translation = -(camera.camera_from_world.rotation * center);
+  camera.camera_from_world = Facing(center, forward, right);
   return camera;
 }
 

@@ -6,6 +6,7 @@
 
 #include "kernels/base/error.h"
 #include "kernels/scene/camera_checks.h"
+#include "kernels/scene/facing.h"
 #include "pipeline/files/atomic_file.h"
 #include "pipeline/files/npy_header.h"
 
@@ -46,11 +47,7 @@ Camera CameraOf(const std::string& path, size_t row, const double* v) {
   if (!(off < kLlffRigidTolerance)) Refuse(path, row, "the matrix is not a rotation");
   const Vec3d forward = Normalized(axis[2]);
   const Vec3d right = Normalized(axis[0] - forward * Dot(axis[0], forward));
-  Mat3d& rotation = camera.camera_from_world.rotation;
-  rotation.row[0] = right;
-  rotation.row[1] = Cross(forward, right);
-  rotation.row[2] = forward;
-  camera.camera_from_world.translation = -(rotation * Vec3d{at(0, 3), at(1, 3), at(2, 3)});
+  camera.camera_from_world = Facing(Vec3d{at(0, 3), at(1, 3), at(2, 3)}, forward, right);
   const std::string implausible = ImplausibleCamera(camera);
   if (!implausible.empty()) Refuse(path, row, "the camera has " + implausible);
   return camera;

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "kernels/base/error.h"
+#include "kernels/image/decibels.h"
 #include "kernels/render/field_renderer.h"
 #include "pipeline/capture/working_views.h"
 #include "pipeline/files/text.h"
@@ -36,7 +37,7 @@ double PsnrOf(const std::vector<Image>& a, const std::vector<Image>& b) {
   for (size_t i = 0; i < a.size(); ++i)
     for (size_t k = 0; k < a[i].pixels.size(); ++k, ++count)
       sum += std::pow(double{a[i].pixels[k]} - double{b[i].pixels[k]}, 2);
-  return -10 * std::log10(std::max(sum / std::max(count, 1.0), 1e-12));
+  return Decibels(sum / std::max(count, 1.0));
 }
 
 std::string LossText(const std::vector<Image>& own, const std::vector<Image>& after) {

@@ -4,10 +4,10 @@
 #include <filesystem>
 
 #include "kernels/base/error.h"
+#include "kernels/base/options.h"
 #include "kernels/render/field_renderer.h"
 #include "pipeline/capture/working_views.h"
 #include "pipeline/commands/command.h"
-#include "pipeline/commands/sheet_options.h"
 #include "pipeline/fields/field_file.h"
 #include "pipeline/files/text.h"
 #include "pipeline/images/contact_sheet.h"
@@ -21,6 +21,27 @@ namespace regrade {
 namespace {
 
 namespace fs = std::filesystem;
+
+struct SheetOptions {
+  std::string out;
+  int views = 3;
+  int size = 320;
+
+  template <typename Bind>
+  void Describe(Bind& bind) {
+    bind("out", out, {.help = "the picture to write, a PNG file"});
+    bind("views", views,
+         {.unit = "photos",
+          .help = "photos shown of each style, evenly spaced",
+          .min = 1,
+          .max = 100});
+    bind("size", size,
+         {.unit = "pixels",
+          .help = "longer side of each picture on the sheet",
+          .min = 64,
+          .max = 4096});
+  }
+};
 
 // Views evenly spaced among all.
 std::vector<int> ShownViews(int views, int count) {

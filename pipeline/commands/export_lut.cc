@@ -1,11 +1,11 @@
 #include "pipeline/commands/export_lut.h"
 
 #include <algorithm>
-#include <cmath>
 #include <filesystem>
 #include <vector>
 
 #include "kernels/base/error.h"
+#include "kernels/image/decibels.h"
 #include "pipeline/commands/compared_renders.h"
 #include "pipeline/fields/field_file.h"
 #include "pipeline/files/atomic_file.h"
@@ -83,8 +83,8 @@ void ExportLut(const ExportOptions& options, const std::string& folder, Console*
       "wrote %s: style %s as a LUT of %d^3 colours; on renders it is %.1f dB from the styled "
       "scene, which may differ from place to place, and magnifies differences at most %.2f "
       "times",
-      options.out.c_str(), name.c_str(), kSize,
-      -10 * std::log10(std::max(sum / std::max(count, 1.0), 1e-12)), SteepestSlope(table)));
+      options.out.c_str(), name.c_str(), kSize, Decibels(sum / std::max(count, 1.0)),
+      SteepestSlope(table)));
 }
 
 }  // namespace regrade

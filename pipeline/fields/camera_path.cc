@@ -6,6 +6,7 @@
 
 #include "kernels/base/error.h"
 #include "kernels/scene/common_camera.h"
+#include "kernels/scene/facing.h"
 
 namespace regrade {
 namespace {
@@ -48,11 +49,7 @@ Camera LookingAlong(const Camera& model, const Vec3d& center, const Vec3d& ahead
   if (Norm(right) < 1e-9) right = Cross(forward, Vec3d{1, 0, 0} + up * 0.5);
   right = Normalized(right);
   Camera camera = model;
-  Mat3d& rotation = camera.camera_from_world.rotation;
-  rotation.row[0] = right;
-  rotation.row[1] = Cross(forward, right);
-  rotation.row[2] = forward;
-  camera.camera_from_world.translation = -(rotation * center);
+  camera.camera_from_world = Facing(center, forward, right);
   return camera;
 }
 

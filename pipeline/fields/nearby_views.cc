@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "kernels/base/quantile.h"
+#include "kernels/scene/facing.h"
 #include "pipeline/fields/camera_path.h"
 
 namespace regrade {
@@ -21,11 +22,7 @@ Camera Between(const Camera& a, const Camera& b, double part) {
   const Vec3d front = Normalized(mix(a.Forward(), b.Forward()));
   const Vec3d right = Normalized(Cross(front, mix(a.Up(), b.Up())));
   Camera camera = a;
-  Mat3d& rotation = camera.camera_from_world.rotation;
-  rotation.row[0] = right;
-  rotation.row[1] = Cross(front, right);
-  rotation.row[2] = front;
-  camera.camera_from_world.translation = -(rotation * mix(a.Center(), b.Center()));
+  camera.camera_from_world = Facing(mix(a.Center(), b.Center()), front, right);
   return camera;
 }
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "kernels/image/decibels.h"
 #include "kernels/render/field_renderer.h"
 #include "pipeline/fields/camera_path.h"
 
@@ -23,15 +24,14 @@ Mat3d Turn(const Vec3d& x, const Vec3d& y, const Vec3d& z) {
   return m;
 }
 
-double Psnr(const Image& a, const Image& b) {
-  double sum = 0;
-  for (size_t i = 0; i < a.pixels.size(); ++i)
-    sum += std::pow(double{a.pixels[i]} - double{b.pixels[i]}, 2);
-  const double n = static_cast<double>(std::max<size_t>(a.pixels.size(), 1));
-  return -10 * std::log10(std::max(sum / n, 1e-12));
-}
-
 }  // namespace
+
+Camera SmallerView(const Camera& camera, int longest) {
+  const double scale =
+      std::min(1.0, static_cast<double>(longest) / std::max(camera.width, camera.height));
+  return camera.Resized(std::max(1, static_cast<int>(camera.width * scale)),
+                        std::max(1, static_cast<int>(camera.height * scale)));
+}
 
 std::vector<Camera> CheckedViews(const std::vector<Camera>& photos, int longest) {
   constexpr int kPhotos = 12, kPath = 8;
@@ -55,12 +55,7 @@ std::vector<Camera> CheckedViews(const std::vector<Camera>& photos, int longest)
   cameras.push_back(Placed(first, Turn(right, Cross(back, right), back), here));
   cameras.push_back(Placed(first, {}, here + first.Forward() * (0.3 * Norm(mean - here))));
   cameras.push_back(Placed(first, Turn({0, 1, 0}, {-1, 0, 0}, {0, 0, 1}), here));
-  for (Camera& camera : cameras) {
-    const double scale =
-        std::min(1.0, static_cast<double>(longest) / std::max(camera.width, camera.height));
-    camera = camera.Resized(std::max(1, static_cast<int>(camera.width * scale)),
-                            std::max(1, static_cast<int>(camera.height * scale)));
-  }
+  for (Camera& camera : cameras) camera = SmallerView(camera, longest);
   return cameras;
 }
 
@@ -69,7 +64,8 @@ PageCheck CheckPage(const RadianceField& exact, const RadianceField& page,
   const FieldRenderer of_exact(exact, Backend::kCpu), of_page(page, Backend::kCpu);
   PageCheck check{1e9, 0, static_cast<int>(cameras.size())};
   for (const Camera& camera : cameras) {
-    const double db = Psnr(of_exact.Render(camera).color, of_page.Render(camera).color);
+    const double db =
+        DecibelsBetween(of_exact.Render(camera).color, of_page.Render(camera).color);
     check.worst_db = std::min(check.worst_db, db);
     check.mean_db += db / check.views;
   }

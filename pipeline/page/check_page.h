@@ -13,6 +13,9 @@ struct PageCheck {
   int views = 0;
 };
 
+// With at most `longest` pixels along a side.
+Camera SmallerView(const Camera& camera, int longest);
+
 // 24 cameras in the field's frame: 12 of the photos' (evenly spaced), 8 of the smooth path, and
 // four that few would choose: at the photos' mean place, looking back, between the first photo
 // and what it sees, and turned on its side. At most `longest` pixels along a side. `photos`:

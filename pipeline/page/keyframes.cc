@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "kernels/base/error.h"
+#include "kernels/scene/facing.h"
 #include "pipeline/files/atomic_file.h"
 #include "pipeline/files/json_file.h"
 #include "pipeline/workspace/stage_record.h"
@@ -160,10 +161,7 @@ Camera CameraOfKeyframe(const Keyframe& key, int width, int height, const NdcSpa
   camera.fx = camera.fy = std::sqrt(wide * high);
   camera.cx = width / 2.0, camera.cy = height / 2.0;
   const Vec3d side = Unit(Cross(key.forward, key.up));
-  camera.camera_from_world.rotation.row[0] = side;
-  camera.camera_from_world.rotation.row[1] = Cross(key.forward, side);
-  camera.camera_from_world.rotation.row[2] = key.forward;
-  camera.camera_from_world.translation = -(camera.camera_from_world.rotation * key.eye);
+  camera.camera_from_world = Facing(key.eye, key.forward, side);
   camera.ndc = ndc;
   return camera;
 }

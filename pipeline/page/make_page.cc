@@ -76,10 +76,7 @@ RadianceField ExactStyle(const RadianceField& source, const StoredNetwork& netwo
 }
 
 Image RenderHome(const RadianceField& field, const Camera& home) {
-  const double scale = std::min(1.0, double{kPoster} / std::max(home.width, home.height));
-  const Camera camera = home.Resized(std::max(1, static_cast<int>(home.width * scale)),
-                                     std::max(1, static_cast<int>(home.height * scale)));
-  return FieldRenderer(field, Backend::kCpu).Render(camera).color;
+  return FieldRenderer(field, Backend::kCpu).Render(SmallerView(home, kPoster)).color;
 }
 
 void AddPhotos(const WorkingViews& views, bool named, PageContent* content) {

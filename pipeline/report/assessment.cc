@@ -120,9 +120,9 @@ Part Steady(const RunReport& report) {
 // PSNR to the 2D method's frames: 30 dB is an error of 8 levels of 255, hard to see.
 Part Faithful(const RunReport& report) {
   const auto row = std::ranges::find(report.evaluation.fidelity, std::string("styled"),
-                                     &FidelityMetrics::sequence);
+                                     &FidelityRow::sequence);
   if (row == report.evaluation.fidelity.end()) return {"faithful: not measured", ""};
-  const Metric& psnr = row->psnr_to_2d_db;
+  const Metric psnr(row->psnr_to_2d_db);
   if (psnr.infinite) return {"faithful: exactly the recoloured views", "", 1};
   if (!psnr.value) return {"faithful: not measured (" + psnr.why + ")", ""};
   const auto& evaluate = report.stages.evaluate;

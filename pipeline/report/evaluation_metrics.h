@@ -1,11 +1,12 @@
 // What an evaluation measures: consistency, fidelity, and each pair of frames.
 #pragma once
 
-#include <cstdint>
 #include <optional>
 #include <string>
 #include <vector>
 
+#include "evaluate/consistency_report.h"
+#include "evaluate/fidelity_row.h"
 #include "pipeline/workspace/metric.h"
 
 namespace regrade {
@@ -49,62 +50,6 @@ struct ConsistencyMetrics {
     visit("tc_psnr_pairs_db", tc_psnr_pairs_db);
     visit("heat_map", heat_map, {.optional = true});
     visit("heat_map_from", heat_map_from);
-  }
-};
-
-// One pair of one sequence, and how many of its pixels were left out for which reason.
-struct PairMetrics {
-  std::string sequence;
-  int from = 0, to = 0;  // frames, counted from 0
-  Metric error;          // mean square over compared pixels and channels, white = 1
-  Metric tc_psnr_db;
-  double coverage = 0;        // fraction of the frame that was compared
-  bool low_coverage = false;  // too little for a reliable number
-  int64_t flow_not_finite = 0, out_of_frame = 0, disoccluded = 0, motion_boundary = 0,
-          colour_not_finite = 0;
-
-  template <typename Visit>
-  void Describe(Visit& visit) {
-    int gap = to - from;  // written for readers of the file
-    visit("sequence", sequence);
-    visit("gap", gap);
-    visit("from", from);
-    visit("to", to);
-    visit("error", error);
-    visit("tc_psnr_db", tc_psnr_db);
-    visit("coverage", coverage);
-    visit("low_coverage", low_coverage);
-    visit("flow_not_finite", flow_not_finite);
-    visit("out_of_frame", out_of_frame);
-    visit("disoccluded", disoccluded);
-    visit("motion_boundary", motion_boundary);
-    visit("colour_not_finite", colour_not_finite);
-  }
-};
-
-// How close a sequence is to the 2D method's pictures, and how much colour it has kept.
-struct FidelityMetrics {
-  std::string sequence;
-  Metric psnr_to_2d_db;
-  std::optional<double> lpips_to_2d;  // where a network was given
-  std::optional<double> structure;    // where the unstyled frames are known
-  Metric hue_std, hue_std_2d;         // radians
-  Metric chroma, chroma_2d;           // CIELAB
-  Metric sliced_wasserstein_to_style;
-  std::optional<double> edge_ssim;  // where --edges was given
-
-  template <typename Visit>
-  void Describe(Visit& visit) {
-    visit("sequence", sequence);
-    visit("psnr_to_2d_db", psnr_to_2d_db);
-    visit("lpips_to_2d", lpips_to_2d);
-    visit("structure", structure);
-    visit("hue_std", hue_std);
-    visit("hue_std_2d", hue_std_2d);
-    visit("chroma", chroma);
-    visit("chroma_2d", chroma_2d);
-    visit("sliced_wasserstein_to_style", sliced_wasserstein_to_style);
-    visit("edge_ssim", edge_ssim);
   }
 };
 
@@ -154,8 +99,8 @@ struct MissingControl {
 // What an evaluation measures of sequences of frames.
 struct EvaluationMetrics {
   std::vector<ConsistencyMetrics> consistency;
-  std::vector<FidelityMetrics> fidelity;
-  std::vector<PairMetrics> pairs;  // of all sequences, by first frame
+  std::vector<FidelityRow> fidelity;
+  std::vector<PairResult> pairs;  // of all sequences, by first frame
   // In place of consistency and pairs in mode stylegaussian.
   std::optional<std::vector<WarpedMetrics>> warped;
   std::optional<std::vector<MissingControl>> missing_controls;  // absent where none is missing

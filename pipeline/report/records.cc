@@ -42,24 +42,6 @@ ConsistencyMetrics MetricsOfRow(const ConsistencyRow& row,
   return metrics;
 }
 
-PairMetrics MetricsOfPair(const PairResult& pair) {
-  const std::string why = pair.error ? "" : "no pixel can be compared";
-  PairMetrics metrics;
-  metrics.sequence = pair.sequence;
-  metrics.from = pair.from;
-  metrics.to = pair.to;
-  metrics.error = Metric(pair.error, why);
-  metrics.tc_psnr_db = Metric(pair.psnr_db, why);
-  metrics.coverage = pair.coverage;
-  metrics.low_coverage = pair.low_coverage;
-  metrics.flow_not_finite = pair.flow_not_finite;
-  metrics.out_of_frame = pair.out_of_frame;
-  metrics.disoccluded = pair.disoccluded;
-  metrics.motion_boundary = pair.motion_boundary;
-  metrics.colour_not_finite = pair.colour_not_finite;
-  return metrics;
-}
-
 WarpedMetrics MetricsOfWarped(const WarpedRow& row, const std::vector<WarpedPair>& pairs) {
   WarpedMetrics metrics;
   metrics.sequence = row.sequence;
@@ -83,21 +65,6 @@ WarpedMetrics MetricsOfWarped(const WarpedRow& row, const std::vector<WarpedPair
     metrics.rmse_pairs_published.push_back(Metric(pair.published.rmse));
     metrics.rmse_pairs.push_back(Metric(pair.corrected.rmse));
   }
-  return metrics;
-}
-
-FidelityMetrics MetricsOfFidelity(const FidelityRow& row) {
-  FidelityMetrics metrics;
-  metrics.sequence = row.sequence;
-  metrics.psnr_to_2d_db = Metric(row.psnr_to_2d_db);
-  metrics.lpips_to_2d = row.lpips_to_2d;
-  metrics.structure = row.structure;
-  metrics.hue_std = Metric(row.hue_std);
-  metrics.hue_std_2d = Metric(row.hue_std_2d);
-  metrics.chroma = Metric(row.chroma);
-  metrics.chroma_2d = Metric(row.chroma_2d);
-  metrics.sliced_wasserstein_to_style = Metric(row.sliced_wasserstein_to_style);
-  metrics.edge_ssim = row.edge_ssim;
   return metrics;
 }
 
@@ -126,8 +93,8 @@ EvaluationMetrics MetricsOf(const ConsistencyReport& consistency,
       metrics.consistency.back().heat_map_from = map.from;
     }
   }
-  for (const FidelityRow& row : fidelity) metrics.fidelity.push_back(MetricsOfFidelity(row));
-  for (const PairResult& pair : consistency.pairs) metrics.pairs.push_back(MetricsOfPair(pair));
+  metrics.fidelity = fidelity;
+  metrics.pairs = consistency.pairs;
   if (!consistency.warped.empty()) metrics.warped.emplace();
   for (const WarpedRow& row : consistency.warped)
     metrics.warped->push_back(MetricsOfWarped(row, consistency.warped_pairs));

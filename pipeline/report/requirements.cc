@@ -32,6 +32,11 @@ struct NumberFinder {
       found = member ? Metric(static_cast<double>(*member)) : Metric();
     }
   }
+
+  void OrNull(const char* key, std::optional<double>& member, const char* = "") {
+    Metric metric(member);
+    (*this)(key, metric);
+  }
 };
 
 template <typename Metrics>
@@ -75,7 +80,7 @@ std::optional<Metric> NumberOfStage(StagesReport stages, const Requirement& want
 // Throws unless an evaluation can measure it.
 void CheckName(const Requirement& wanted, const std::vector<int>& gaps, int styled) {
   const bool of_pairs = NumberIn(ConsistencyMetrics(), wanted.metric).has_value();
-  const bool of_frames = NumberIn(FidelityMetrics(), wanted.metric).has_value();
+  const bool of_frames = NumberIn(FidelityRow(), wanted.metric).has_value();
   bool known_metric = of_pairs || of_frames;
   if (!IsSequence(wanted.subject, styled)) {
     bool known = false;
@@ -152,7 +157,7 @@ Metric Measured(const Requirement& wanted, const RunReport& report) {
     }
     return OnlyOf(there);
   }
-  for (const FidelityMetrics& row : report.evaluation.fidelity) {
+  for (const FidelityRow& row : report.evaluation.fidelity) {
     if (row.sequence == wanted.subject) return NumberIn(row, wanted.metric).value_or(Metric());
     there.push_back(row.sequence);
   }

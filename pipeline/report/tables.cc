@@ -1,6 +1,7 @@
 #include "pipeline/report/tables.h"
 
 #include <algorithm>
+#include <optional>
 #include <utility>
 #include <vector>
 
@@ -84,10 +85,10 @@ std::string HeadlineMetricsHtml(const RunReport& report) {
   // Consistency is never shown without fidelity.
   const auto fidelity =
       std::find_if(evaluation.fidelity.begin(), evaluation.fidelity.end(),
-                   [](const FidelityMetrics& row) { return row.sequence == "styled"; });
+                   [](const FidelityRow& row) { return row.sequence == "styled"; });
   if (fidelity != evaluation.fidelity.end()) {
     card("fidelity to the 2D method (PSNR)",
-         MetricHtml(fidelity->psnr_to_2d_db, 2, "<small>dB</small>"));
+         MetricHtml(Metric(fidelity->psnr_to_2d_db), 2, "<small>dB</small>"));
   } else if (styled != nullptr) {
     card("fidelity to the 2D method (PSNR)", MetricHtml(Metric(), 2));
   }
@@ -112,8 +113,7 @@ std::string ConsistencyHtml(const RunReport& report) {
     for (const auto& row : report.evaluation.consistency) {
       if (row.sequence == sequence) rows.push_back(&row);
     }
-    const FidelityMetrics none;
-    const FidelityMetrics* fidelity = &none;
+    const FidelityRow* fidelity = nullptr;
     for (const auto& row : report.evaluation.fidelity) {
       if (row.sequence == sequence) fidelity = &row;
     }
@@ -134,18 +134,25 @@ std::string ConsistencyHtml(const RunReport& report) {
               Number(row.tc_psnr_mean_db, 2) + Cell(IntervalHtml(row), "n") +
               Number(row.tc_psnr_of_mean_db, 2) + Cell(pairs, "n") + Number(row.coverage, 2);
       if (i == 0) {
-        std::string to_2d = MetricHtml(fidelity->psnr_to_2d_db, 2);
-        if (fidelity->lpips_to_2d)
-          to_2d += "<br>LPIPS " + MetricHtml(*fidelity->lpips_to_2d, 3);
-        if (fidelity->structure)
-          to_2d += "<br>structure " + MetricHtml(*fidelity->structure, 3);
-        if (fidelity->edge_ssim)
-          to_2d += "<br>edge SSIM " + MetricHtml(*fidelity->edge_ssim, 3);
-        const std::string to_style = MetricHtml(fidelity->sliced_wasserstein_to_style, 4);
-        body += SpanningCell(to_2d, n, "n divider") +
-                SpanningCell(WithTarget(fidelity->hue_std, fidelity->hue_std_2d, 3), n, "n") +
-                SpanningCell(WithTarget(fidelity->chroma, fidelity->chroma_2d, 1), n, "n") +
-                SpanningCell(to_style, n, "n");
+        const auto metric = [&](std::optional<double> FidelityRow::*member) {
+          return fidelity == nullptr ? Metric() : Metric(fidelity->*member);
+        };
+        std::string to_2d = MetricHtml(metric(&FidelityRow::psnr_to_2d_db), 2);
+        for (const auto& [name, member] : {std::pair{"LPIPS ", &FidelityRow::lpips_to_2d},
+                                           {"structure ", &FidelityRow::structure},
+                                           {"edge SSIM ", &FidelityRow::edge_ssim}})
+          if (fidelity != nullptr && fidelity->*member)
+            to_2d += std::string("<br>") + name + MetricHtml(metric(member), 3);
+        body +=
+            SpanningCell(to_2d, n, "n divider") +
+            SpanningCell(
+                WithTarget(metric(&FidelityRow::hue_std), metric(&FidelityRow::hue_std_2d), 3),
+                n, "n") +
+            SpanningCell(
+                WithTarget(metric(&FidelityRow::chroma), metric(&FidelityRow::chroma_2d), 1), n,
+                "n") +
+            SpanningCell(MetricHtml(metric(&FidelityRow::sliced_wasserstein_to_style), 4), n,
+                         "n");
       }
       body += "</tr>";
     }

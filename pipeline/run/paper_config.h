@@ -27,7 +27,7 @@ JsonValue PaperValues(const std::string& name);
 JsonValue RecipeValues(const RunSettings& settings);
 JsonValue ProtocolValues(const RunSettings& settings);
 
-// What the choice depends on; see paper_traits.h.
+// What the choice depends on.
 struct PaperTraits {
   bool transparent = false, forward_facing = false;
 };

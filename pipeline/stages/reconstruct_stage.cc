@@ -6,6 +6,7 @@
 #include "kernels/base/error.h"
 #include "pipeline/capture/capture_store.h"
 #include "pipeline/capture/measured_depths.h"
+#include "pipeline/capture/scene_profile.h"
 #include "pipeline/capture/working_views.h"
 #include "pipeline/fields/field_file.h"
 #include "pipeline/files/text.h"
@@ -14,7 +15,6 @@
 #include "pipeline/report/stage_metrics.h"
 #include "pipeline/run/fit_kind.h"
 #include "pipeline/run/paper_config.h"
-#include "pipeline/run/paper_traits.h"
 #include "pipeline/run/profile_run.h"
 #include "pipeline/run/run_context.h"
 #include "pipeline/stages/fit_quality.h"
@@ -22,6 +22,8 @@
 #include "pipeline/stages/stages.h"
 #include "pipeline/workspace/folder_size.h"
 #include "pipeline/workspace/metrics_json.h"
+#include "reconstruct/scene/forward_facing.h"
+#include "reconstruct/scene/scene_checks.h"
 
 namespace regrade {
 namespace {
@@ -29,6 +31,12 @@ namespace {
 constexpr double kAfterFit =
     0.08;  // pruning, writing and measuring, as a fraction of the steps' time
 constexpr double kTrial = 0.08;  // the trial of degrees, likewise
+
+// Measured; reads the photos' transparency.
+PaperTraits TraitsOf(const Capture& capture) {
+  return {ShowsThroughPhotos(capture),
+          MeasureForwardFacing(WithParallax(capture, kLeastParallaxDeg)).on};
+}
 
 int64_t PixelsOf(const WorkingViews& views, const std::vector<int>& photos) {
   int64_t pixels = 0;

@@ -9,6 +9,7 @@
 #include "kernels/base/error.h"
 #include "kernels/splats/splat_color.h"
 #include "kernels/splats/splat_field.h"
+#include "pipeline/stages/placed_cameras.h"
 #include "reconstruct/colmap/colmap_model.h"
 #include "reconstruct/views/splat_extent.h"
 
@@ -18,13 +19,6 @@ namespace {
 constexpr int64_t kMostPoints = 8000;
 constexpr int kSide = 160;           // pixels of the longer side of the depths
 constexpr double kSameDepth = 0.05;  // relative: a splat at the depth that a view shows
-
-Camera Small(const Camera& camera) {
-  const Camera pinhole = camera.Undistorted();
-  const double scale = std::min(1.0, double{kSide} / std::max(camera.width, camera.height));
-  return pinhole.Resized(std::max(1, static_cast<int>(std::lround(camera.width * scale))),
-                         std::max(1, static_cast<int>(std::lround(camera.height * scale))));
-}
 
 bool Shows(const Camera& small, const Image& depths, const Vec3d& point) {
   double u = 0, v = 0, depth = 0;
@@ -53,7 +47,7 @@ void AddSplatPoints(const RadianceField& field, const FieldRenderer& renderer,
           std::clamp(0.5f + static_cast<float>(kSh0) * sh[c * splats.basis], 0.0f, 1.0f);
   }
   for (size_t v = 0; v < capture->views.size(); ++v) {
-    const Camera small = Small(capture->views[v].camera);
+    const Camera small = ReducedTo(kSide, capture->views[v].camera.Undistorted());
     const Image depths = renderer.Render(small).depth;
     for (ScenePoint& point : points)
       if (Shows(small, depths, point.position)) point.views.push_back(static_cast<int32_t>(v));

@@ -5,6 +5,7 @@
 // std::optional is absent; every other key must be there when it is read.
 #pragma once
 
+#include <limits>
 #include <type_traits>
 #include <utility>
 #include <vector>
@@ -48,6 +49,11 @@ struct Writer {
       (*object)[key] = ValueToJson(member);
     }
   }
+
+  // A number of a library without Metric: null with its reason where it is missing or infinite.
+  void OrNull(const char* key, std::optional<double>& member, const char* why = "") {
+    PutMetric(key, Metric(member, why), object);
+  }
 };
 
 struct Reader {
@@ -68,6 +74,11 @@ struct Reader {
       else
         member = Read<T>(key, object.At(key));
     }
+  }
+
+  void OrNull(const char* key, std::optional<double>& member, const char* = "") {
+    const Metric metric = MetricAt(object, key);
+    member = metric.infinite ? std::numeric_limits<double>::infinity() : metric.value;
   }
 
   // A wrong kind of value names its key; a missing one has been named already.

@@ -6,6 +6,7 @@
 
 #include "kernels/field/cpu/render_view.h"
 #include "kernels/field/render.h"
+#include "kernels/image/decibels.h"
 #include "kernels/image/resize.h"
 
 namespace regrade {
@@ -40,8 +41,7 @@ double PsnrOn(const std::vector<TrainingView>& views, const RadianceField& field
       ++count;
     }
   }
-  // Identical images get 120 dB instead of infinity.
-  return -10 * std::log10(std::max(squares / static_cast<double>(count), 1e-12));
+  return Decibels(squares / static_cast<double>(count));
 }
 
 }  // namespace

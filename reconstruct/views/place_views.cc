@@ -9,6 +9,7 @@
 
 #include "kernels/base/error.h"
 #include "kernels/base/quantile.h"
+#include "kernels/scene/facing.h"
 #include "reconstruct/views/probe_view.h"
 #include "reconstruct/views/splat_extent.h"
 
@@ -51,10 +52,7 @@ Camera LookAt(const Vec3d& from, const Vec3d& way, const Vec3d& up, int longest,
   camera.fx = camera.fy = kFocal * longest;
   camera.cx = 0.5 * camera.width, camera.cy = 0.5 * camera.height;
   const Vec3d front = Normalized(way), right = Normalized(Cross(front, up));
-  camera.camera_from_world.rotation.row[0] = right;
-  camera.camera_from_world.rotation.row[1] = Cross(front, right);
-  camera.camera_from_world.rotation.row[2] = front;
-  camera.camera_from_world.translation = -(camera.camera_from_world.rotation * from);
+  camera.camera_from_world = Facing(from, front, right);
   return camera;
 }
 

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "kernels/base/error.h"
+#include "kernels/image/decibels.h"
 #include "stylize/field/base_map.h"
 #include "stylize/training/initial_network.h"
 #include "stylize/training/style_rays.h"
@@ -16,8 +17,6 @@ namespace {
 
 // Random stream of the sample; those of the steps count from 0.
 constexpr uint64_t kSampleStream = ~uint64_t{0};
-
-double Psnr(double mse) { return -10 * std::log10(std::max(mse, 1e-12)); }
 
 std::string FirstNonFinite(const LipschitzNetwork& network, const std::vector<double>& gradient,
                            double loss) {
@@ -229,9 +228,9 @@ TrainNetworkResult Training::Conclude() {
   result_.smallest_k = network_.SmallestK();
   if (result_.smallest_k < 10 * std::sqrt(kSquareplusB))
     result_.warnings.push_back("a layer's norm has vanished: the network is constant");
-  result_.psnr_db = Psnr(mse);
+  result_.psnr_db = Decibels(mse);
   result_.linear_map = state_.linear_map;
-  result_.linear_map_psnr_db = network_.data().has_base ? Psnr(state_.linear_map_mse) : 0;
+  result_.linear_map_psnr_db = network_.data().has_base ? Decibels(state_.linear_map_mse) : 0;
   result_.steps = state_.step;
   result_.history = std::move(state_.history);
   result_.history.steps.push_back(state_.step);
@@ -278,7 +277,7 @@ TrainNetworkResult TrainNetwork(const RadianceField& field,
     }
     const LoopControl control =
         Report(hooks.progress, training.steps_done(), options.steps,
-               Format("%.1f dB on this step's rays", Psnr(steps.last.Mse())));
+               Format("%.1f dB on this step's rays", Decibels(steps.last.Mse())));
     const bool last =
         control != LoopControl::kContinue || training.steps_done() == options.steps;
     if (hooks.checkpoint && (last || training.steps_done() % hooks.checkpoint_every == 0))

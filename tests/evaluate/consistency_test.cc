@@ -1,19 +1,19 @@
 #include "evaluate/consistency.h"
 
 #include <gtest/gtest.h>
-#include <unistd.h>
 
 #include <atomic>
 #include <cmath>
 #include <filesystem>
-#include <functional>
 #include <limits>
 
 #include "evaluate/flow_file.h"
 #include "evaluate/optical_flow.h"
 #include "kernels/base/error.h"
 #include "tests/evaluate/synthetic_frames.h"
+#include "tests/support/expect_error.h"
 #include "tests/support/record_error.h"
+#include "tests/support/temporary_folder.h"
 
 namespace regrade {
 namespace {
@@ -26,25 +26,12 @@ PairMotionFunction Still(float weight = 1) {
   return [=](int, int) { return StillMotion(kW, kH, weight); };
 }
 
-ConsistencyOptions Gaps(std::vector<int> gaps) {
-  ConsistencyOptions options;
-  options.gaps = std::move(gaps);
-  return options;
-}
+ConsistencyOptions Gaps(std::vector<int> gaps) { return {.gaps = std::move(gaps)}; }
 
 FrameSource Levels(std::vector<float> levels) {
   std::vector<Image> images;
   for (const float level : levels) images.push_back(ConstantImage(kW, kH, level));
   return Frames(std::move(images));
-}
-
-ExitCode CodeOf(const std::function<void()>& body) {
-  try {
-    body();
-  } catch (const Error& error) {
-    return error.code();
-  }
-  return ExitCode::kDone;
 }
 
 TEST(Consistency, H111_EmptyMaskIsUndefinedAndCounted) {
@@ -168,10 +155,8 @@ TEST(Consistency, ForwardWarpingRefusesTheSwitches) {
     ConsistencyOptions options = Gaps({1});
     options.mode = "stylegaussian";
     (direction ? options.warp : options.error_per) = direction ? "earlier" : "pixel";
-    EXPECT_EQ(CodeOf([&] {
-                EvaluateConsistency(frames, {{"s", frames}}, options);
-              }),
-              ExitCode::kUsage);
+    EXPECT_REGRADE_ERROR(EvaluateConsistency(frames, {{"s", frames}}, options),
+                         ExitCode::kUsage);
   }
 }
 
@@ -294,27 +279,17 @@ TEST(Consistency, H122_MismatchedSequencesAreClearErrors) {
   const FrameSource growing = Frames({WaveImage(40, 30, 0, 0), WaveImage(41, 30, 1, 0)});
   const FrameSource fading = Frames({WaveImage(40, 30, 0, 0), NoiseImage(40, 30, 1, 1)});
   for (const FrameSource& bad : {short_one, wide, growing, fading})
-    EXPECT_EQ(CodeOf([&] {
-                EvaluateConsistency(reference, {{"s", bad}}, {});
-              }),
-              ExitCode::kInput);
+    EXPECT_REGRADE_ERROR(EvaluateConsistency(reference, {{"s", bad}}, {}), ExitCode::kInput);
   const FrameSource tiny = Frames({NoiseImage(8, 8, 1), NoiseImage(8, 8, 2)});
-  EXPECT_EQ(CodeOf([&] { EvaluateConsistency(tiny, {{"s", tiny}}, {}); }), ExitCode::kInput);
-  EXPECT_EQ(CodeOf([&] {
-              EvaluateConsistency(reference, {{"s", reference}}, Gaps({0}));
-            }),
-            ExitCode::kUsage);
-  ConsistencyOptions options;
-  options.mode = "lai2019";
-  EXPECT_EQ(CodeOf([&] {
-              EvaluateConsistency(reference, {{"s", reference}}, options);
-            }),
-            ExitCode::kUsage);
+  EXPECT_REGRADE_ERROR(EvaluateConsistency(tiny, {{"s", tiny}}, {}), ExitCode::kInput);
+  EXPECT_REGRADE_ERROR(EvaluateConsistency(reference, {{"s", reference}}, Gaps({0})),
+                       ExitCode::kUsage);
+  ConsistencyOptions options{.mode = "lai2019"};
+  EXPECT_REGRADE_ERROR(EvaluateConsistency(reference, {{"s", reference}}, options),
+                       ExitCode::kUsage);
   options.mode = "geometry";
-  EXPECT_EQ(CodeOf([&] {
-              EvaluateConsistency(reference, {{"s", reference}}, options);
-            }),
-            ExitCode::kUsage);
+  EXPECT_REGRADE_ERROR(EvaluateConsistency(reference, {{"s", reference}}, options),
+                       ExitCode::kUsage);
 }
 
 TEST(Consistency, H123_SumsOfManyPixelsDoNotStall) {
@@ -329,26 +304,19 @@ TEST(Consistency, H123_SumsOfManyPixelsDoNotStall) {
 }
 
 TEST(Consistency, FlowFromFilesIsTheFlowThatWasWritten) {
-  const auto folder =
-      std::filesystem::temp_directory_path() /
-      ("regrade_flows_" + std::to_string(::testing::UnitTest::GetInstance()->random_seed()) +
-       "_" + std::to_string(::getpid()));
-  std::filesystem::create_directory(folder);
+  const testing::TemporaryFolder folder;
   std::vector<Image> waves;
   for (int i = 0; i < 3; ++i) waves.push_back(WaveImage(64, 48, 2 * i, i));
   for (const auto& [i, j] : {std::pair{0, 1}, {1, 0}, {1, 2}, {2, 1}})
     WriteFlowFile(folder / FlowFileName(i, j), ComputeFlow(waves[i], waves[j], "dis-medium"));
   ConsistencyOptions options = Gaps({1});
   const auto computed = EvaluateConsistency(Frames(waves), {{"s", Frames(waves)}}, options);
-  options.flow = "files:" + folder.string();
+  options.flow = "files:" + folder.path();
   const auto read = EvaluateConsistency(Frames(waves), {{"s", Frames(waves)}}, options);
   EXPECT_EQ(*computed.rows.at(0).tc_psnr_mean_db, *read.rows.at(0).tc_psnr_mean_db);
   std::filesystem::remove(folder / FlowFileName(2, 1));
-  EXPECT_EQ(CodeOf([&] {
-              EvaluateConsistency(Frames(waves), {{"s", Frames(waves)}}, options);
-            }),
-            ExitCode::kInput);
-  std::filesystem::remove_all(folder);
+  EXPECT_REGRADE_ERROR(EvaluateConsistency(Frames(waves), {{"s", Frames(waves)}}, options),
+                       ExitCode::kInput);
 }
 
 TEST(Consistency, StopsWhenAsked) {

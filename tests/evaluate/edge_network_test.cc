@@ -40,8 +40,7 @@ TEST(EdgeNetwork, FramesWithOtherEdgesAreLessAlike) {
   Image grey = picture;
   for (int64_t p = 0; p < grey.num_pixels(); ++p)
     std::fill_n(&grey.pixels[3 * p], 3, grey.pixels[3 * p + 1]);
-  ConsistencyOptions options;
-  options.edges = networks.edges;
+  ConsistencyOptions options{.edges = networks.edges};
   FidelityTargets targets;
   targets.unstyled = Frames({picture, picture});
   OpenNetworks(options, &targets);

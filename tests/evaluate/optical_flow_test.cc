@@ -11,20 +11,12 @@
 #include "kernels/base/error.h"
 #include "tests/evaluate/synthetic_frames.h"
 #include "tests/support/data.h"
+#include "tests/support/expect_error.h"
 
 namespace regrade {
 namespace {
 
 using namespace regrade::testing;
-
-ExitCode CodeOf(const std::function<void()>& body) {
-  try {
-    body();
-  } catch (const Error& error) {
-    return error.code();
-  }
-  return ExitCode::kDone;
-}
 
 Image ReadPpm(const std::string& path) {
   std::ifstream file(path, std::ios::binary);
@@ -69,9 +61,9 @@ TEST(OpticalFlow, FollowsAKnownShift) {
 
 TEST(OpticalFlow, H122_SmallMismatchedOrUnknownIsAClearError) {
   const Image small = WaveImage(11, 40, 0, 0), good = WaveImage(13, 17, 0, 0);
-  EXPECT_EQ(CodeOf([&] { ComputeFlow(small, small, "dis-medium"); }), ExitCode::kInput);
-  EXPECT_EQ(CodeOf([&] { ComputeFlow(small, good, "dis-medium"); }), ExitCode::kInput);
-  EXPECT_EQ(CodeOf([&] { ComputeFlow(good, good, "raft"); }), ExitCode::kUsage);
+  EXPECT_REGRADE_ERROR(ComputeFlow(small, small, "dis-medium"), ExitCode::kInput);
+  EXPECT_REGRADE_ERROR(ComputeFlow(small, good, "dis-medium"), ExitCode::kInput);
+  EXPECT_REGRADE_ERROR(ComputeFlow(good, good, "raft"), ExitCode::kUsage);
 }
 
 TEST(OpticalFlow, H122_OddSizesGreyAndAlphaWork) {

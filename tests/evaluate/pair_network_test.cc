@@ -9,29 +9,22 @@
 #include "evaluate/optical_flow.h"
 #include "evaluate/pair_motion.h"
 #include "tests/support/expect_error.h"
+#include "tests/support/pictures.h"
 #include "tests/support/temporary_folder.h"
 #include "tests/support/tiny_onnx.h"
 
 namespace regrade {
 namespace {
 
+using testing::OneColour;
 using testing::TemporaryFolder;
-
-Image Plain(float red, float green, float blue) {
-  Image image(32, 24, 3);
-  for (int64_t i = 0; i < image.num_pixels(); ++i) {
-    image.pixels[static_cast<size_t>(3 * i)] = red;
-    image.pixels[static_cast<size_t>(3 * i + 1)] = green;
-    image.pixels[static_cast<size_t>(3 * i + 2)] = blue;
-  }
-  return image;
-}
 
 TEST(PairNetwork, MotionIsFromTheFirstToTheSecondInPixels) {
   const TemporaryFolder folder;
   testing::WriteText(folder / "flow.onnx", testing::FlowNetwork(24, 32));
   const PairNetwork network(folder / "flow.onnx");
-  const Image dark = Plain(0.2f, 0.5f, 0.1f), bright = Plain(0.6f, 0.5f, 0.1f);
+  const Image dark = OneColour(32, 24, {0.2f, 0.5f, 0.1f}),
+              bright = OneColour(32, 24, {0.6f, 0.5f, 0.1f});
   // Inputs are scaled to -1 to 1: a difference of 0.4 in red becomes 0.8.
   const FlowField there = network.Flow(dark, bright), back = network.Flow(bright, dark);
   for (const auto& [x, y] : {std::pair{0, 0}, {31, 23}, {7, 20}}) {
@@ -45,7 +38,9 @@ TEST(PairNetwork, EvaluationUsesItsMotion) {
   const TemporaryFolder folder;
   testing::WriteText(folder / "flow.onnx", testing::FlowNetwork(24, 32));
   const FrameSource frames{
-      2, [](int i) { return Plain(0.2f + 0.4f * static_cast<float>(i), 0, 0); }};
+      2, [](int i) {
+        return OneColour(32, 24, {0.2f + 0.4f * static_cast<float>(i), 0, 0});
+      }};
   const PairMotionFunction motion =
       EstimatedMotion(frames, "lai2018", "onnx:" + (folder / "flow.onnx"));
   EXPECT_NEAR(motion(0, 1).flow.at(3, 3)[0], 11.2f, 1e-5);
@@ -56,13 +51,14 @@ TEST(PairNetwork, DistanceIsTheNetworkOutput) {
   const TemporaryFolder folder;
   testing::WriteText(folder / "distance.onnx", testing::DistanceNetwork(24, 32));
   const auto distance = PerceptualDistance(folder / "distance.onnx");
-  const Image a = Plain(0.2f, 0.5f, 0.1f), b = Plain(0.6f, 0.5f, 0.3f);
+  const Image a = OneColour(32, 24, {0.2f, 0.5f, 0.1f}),
+              b = OneColour(32, 24, {0.6f, 0.5f, 0.3f});
   EXPECT_EQ(distance(a, a), 0);
   EXPECT_NEAR(distance(a, b), 4 * (0.4 * 0.4 + 0.2 * 0.2) / 3,
               1e-5);  // floats, summed over 768 pixels
   EXPECT_FALSE(PerceptualDistance(""));
-  const Image black = Plain(0, 0, 0),
-              infinite = Plain(std::numeric_limits<float>::infinity(), 0, 0);
+  const Image black = OneColour(32, 24, {0, 0, 0}),
+              infinite = OneColour(32, 24, {std::numeric_limits<float>::infinity(), 0, 0});
   EXPECT_EQ(distance(infinite, black), 0);
 
   FidelityTargets targets;
@@ -85,7 +81,7 @@ TEST(PairNetwork, RefusalsNameTheFile) {
   EXPECT_REGRADE_ERROR(open("text.onnx"), ExitCode::kExternalProgram, "text.onnx");
   testing::WriteText(folder / "distance.onnx", testing::DistanceNetwork(24, 32));
   const PairNetwork distance(folder / "distance.onnx");
-  const Image a = Plain(0, 0, 0);
+  const Image a = OneColour(32, 24, {0, 0, 0});
   EXPECT_REGRADE_ERROR(distance.Flow(a, a), ExitCode::kExternalProgram, "not a motion field");
   EXPECT_REGRADE_ERROR(distance.Distance(a, Image(8, 8, 3)), ExitCode::kExternalProgram,
                        "size");

@@ -79,8 +79,7 @@ TEST(Protocols, AnotherDivisorIsNotTheProtocol) {
     EXPECT_EQ(options.error_per, "channel") << name;
     EXPECT_EQ(ProtocolOf(options), name);
   }
-  ConsistencyOptions open;
-  open.error_per = "pixel";
+  ConsistencyOptions open{.error_per = "pixel"};
   UseProtocol("liprf", &open);
   EXPECT_EQ(open.error_per, "pixel");
   EXPECT_EQ(ProtocolOf(open), "liprf");

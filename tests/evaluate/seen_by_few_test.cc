@@ -5,6 +5,8 @@
 
 #include <functional>
 
+#include "tests/support/pinhole.h"
+
 namespace regrade {
 namespace {
 
@@ -13,10 +15,7 @@ constexpr double kWall = 4;
 
 // Looks along z from (x, 0, z); the picture is 4 x 2 world units at the wall.
 Camera CameraAt(double x, double z = 0) {
-  Camera camera;
-  camera.width = kSeenW, camera.height = kSeenH;
-  camera.fx = camera.fy = kSeenW;
-  camera.cx = kSeenW / 2.0, camera.cy = kSeenH / 2.0;
+  Camera camera = testing::PinholeOf(kSeenW, kSeenH, kSeenW);
   camera.camera_from_world.translation = {-x, 0, -z};
   return camera;
 }

@@ -7,23 +7,11 @@
 
 #include "evaluate/consistency.h"
 #include "kernels/base/random.h"
+#include "tests/support/pictures.h"
 
 namespace regrade::testing {
 
 inline constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
-
-inline Image ConstantImage(int width, int height, float value, int channels = 3) {
-  Image image(width, height, channels);
-  for (float& p : image.pixels) p = value;
-  return image;
-}
-
-inline Image NoiseImage(int width, int height, uint64_t seed, int channels = 3) {
-  Image image(width, height, channels);
-  for (size_t i = 0; i < image.pixels.size(); ++i)
-    image.pixels[i] = static_cast<float>(RandomDouble(seed, 0, i));
-  return image;
-}
 
 // A texture that optical flow can track: waves of several lengths, shifted by (dx, dy) pixels.
 inline Image WaveImage(int width, int height, double dx, double dy) {

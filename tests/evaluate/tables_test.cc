@@ -4,8 +4,12 @@
 
 #include <limits>
 
+#include "tests/support/temporary_folder.h"
+
 namespace regrade {
 namespace {
+
+using testing::Contains;
 
 ConsistencyReport SomeReport() {
   ConsistencyReport report;
@@ -33,30 +37,29 @@ ConsistencyReport SomeReport() {
   return report;
 }
 
-bool Has(const std::string& text, const std::string& part) {
-  return text.find(part) != std::string::npos;
-}
-
 TEST(Tables, FormsForPasting) {
   const std::string markdown = FormatTables(SomeReport(), {}, {.form = "markdown"});
-  EXPECT_TRUE(Has(markdown, "\n| sequence | gap | pairs |")) << markdown;
-  EXPECT_TRUE(
-      Has(markdown, "| styled | 1 | 49 | 2 | 31.23 | [30.88, 31.50] | inf | 30.10 | 81.2 % |"));
+  EXPECT_TRUE(Contains(markdown, "\n| sequence | gap | pairs |")) << markdown;
+  EXPECT_TRUE(Contains(
+      markdown, "| styled | 1 | 49 | 2 | 31.23 | [30.88, 31.50] | inf | 30.10 | 81.2 % |"));
   const std::string csv = FormatTables(SomeReport(), {}, {.form = "csv"});
-  EXPECT_TRUE(Has(csv, "\nstyled,1,49,2,31.23,\"[30.88, 31.50]\",inf,30.10,81.2 %\n")) << csv;
-  EXPECT_TRUE(Has(csv, "\n# styled, gap 5: no pair"));
+  EXPECT_TRUE(Contains(csv, "\nstyled,1,49,2,31.23,\"[30.88, 31.50]\",inf,30.10,81.2 %\n"))
+      << csv;
+  EXPECT_TRUE(Contains(csv, "\n# styled, gap 5: no pair"));
   const std::string latex = FormatTables(SomeReport(), {}, {.form = "latex"});
-  EXPECT_TRUE(Has(latex,
-                  "styled & 1 & 49 & 2 & 31.23 & [30.88, 31.50] & $\\infty$ & 30.10 & 81.2 \\% "
-                  "\\\\\n"))
+  EXPECT_TRUE(
+      Contains(latex,
+               "styled & 1 & 49 & 2 & 31.23 & [30.88, 31.50] & $\\infty$ & 30.10 & 81.2 \\% "
+               "\\\\\n"))
       << latex;
-  EXPECT_TRUE(Has(latex, "\\begin{tabular}{lrrrrrrrr}\n\\toprule\n"));
+  EXPECT_TRUE(Contains(latex, "\\begin{tabular}{lrrrrrrrr}\n\\toprule\n"));
 }
 
 TEST(Tables, ASequenceWithACommaIsQuotedInCsv) {
   ConsistencyReport report = SomeReport();
   report.rows[0].sequence = "mine, \"new\"";
-  EXPECT_TRUE(Has(FormatTables(report, {}, {.form = "csv"}), "\n\"mine, \"\"new\"\"\",1,49"));
+  EXPECT_TRUE(
+      Contains(FormatTables(report, {}, {.form = "csv"}), "\n\"mine, \"\"new\"\"\",1,49"));
 }
 
 TEST(Tables, MetricsUndefinedOnesAndInfinity) {
@@ -64,17 +67,17 @@ TEST(Tables, MetricsUndefinedOnesAndInfinity) {
   fidelity.sequence = "styled";
   fidelity.psnr_to_2d_db = 27.456;
   const std::string text = FormatTables(SomeReport(), {fidelity});
-  EXPECT_TRUE(Has(text, "31.23"));
-  EXPECT_TRUE(Has(text, "[30.88, 31.50]"));
-  EXPECT_TRUE(Has(text, " inf"));
-  EXPECT_TRUE(Has(text, "81.2 %"));
-  EXPECT_TRUE(Has(text, "27.46"));
-  EXPECT_TRUE(Has(text, "styled, gap 5: no pair of frames is 5 apart"));
-  EXPECT_TRUE(Has(text, "3 identical pair(s)"));
-  EXPECT_TRUE(Has(text, "4 pair(s) above 58.9 dB"));
-  EXPECT_TRUE(Has(text, "4 pair(s) with few comparable pixels"));
-  EXPECT_FALSE(Has(text, "nan"));
-  EXPECT_FALSE(Has(text, "was not measured"));
+  EXPECT_TRUE(Contains(text, "31.23"));
+  EXPECT_TRUE(Contains(text, "[30.88, 31.50]"));
+  EXPECT_TRUE(Contains(text, " inf"));
+  EXPECT_TRUE(Contains(text, "81.2 %"));
+  EXPECT_TRUE(Contains(text, "27.46"));
+  EXPECT_TRUE(Contains(text, "styled, gap 5: no pair of frames is 5 apart"));
+  EXPECT_TRUE(Contains(text, "3 identical pair(s)"));
+  EXPECT_TRUE(Contains(text, "4 pair(s) above 58.9 dB"));
+  EXPECT_TRUE(Contains(text, "4 pair(s) with few comparable pixels"));
+  EXPECT_FALSE(Contains(text, "nan"));
+  EXPECT_FALSE(Contains(text, "was not measured"));
 }
 
 // What a paper takes: one float with caption and label, whose columns all have numbers.
@@ -95,18 +98,18 @@ TEST(Tables, LatexIsATableWithCaptionAndLabel) {
   const size_t caption = latex.find("\\caption{");
   const std::string said = latex.substr(caption, latex.find('\n', caption) - caption);
   for (const char* part : {"liprf", "dis-medium", "50 frames of 640 x 480 px", "9.8.7"})
-    EXPECT_TRUE(Has(said, part)) << said;
-  EXPECT_TRUE(Has(latex, "\n\\label{tab:consistency}\n")) << latex;
-  EXPECT_TRUE(Has(latex, "\n\\label{tab:fidelity}\n")) << latex;
+    EXPECT_TRUE(Contains(said, part)) << said;
+  EXPECT_TRUE(Contains(latex, "\n\\label{tab:consistency}\n")) << latex;
+  EXPECT_TRUE(Contains(latex, "\n\\label{tab:fidelity}\n")) << latex;
   // Interval and mean error have no value in any row.
-  EXPECT_TRUE(Has(latex, "\\begin{tabular}{lrrrrrr}\n")) << latex;
+  EXPECT_TRUE(Contains(latex, "\\begin{tabular}{lrrrrrr}\n")) << latex;
   EXPECT_TRUE(
-      Has(latex,
-          "\n{}[a]\\_\\{b\\} \\& \\textbackslash{}c\\textasciicircum{}"
-          "\\textasciitilde{}\\textless{}50\\%\\textgreater{}\\textbar{} & 1 & 49 & 2 & "
-          "$-$1.50 & 30.10 & "))
+      Contains(latex,
+               "\n{}[a]\\_\\{b\\} \\& \\textbackslash{}c\\textasciicircum{}"
+               "\\textasciitilde{}\\textless{}50\\%\\textgreater{}\\textbar{} & 1 & 49 & 2 & "
+               "$-$1.50 & 30.10 & "))
       << latex;
-  EXPECT_TRUE(Has(latex, "\n% control_linear_map: left out, no style\n")) << latex;
+  EXPECT_TRUE(Contains(latex, "\n% control_linear_map: left out, no style\n")) << latex;
 }
 
 TEST(Tables, DifferencesHaveColumnsOfTheirOwn) {
@@ -117,15 +120,15 @@ TEST(Tables, DifferencesHaveColumnsOfTheirOwn) {
   TableContext context{.form = "csv"};
   context.labels = {{"styled", "Ours"}, {"styled_2", "X"}};
   const std::string csv = FormatTables(report, {}, context);
-  EXPECT_TRUE(Has(csv, "mean of dB,95 %,minus Ours,95 %,dB of mean")) << csv;
-  EXPECT_TRUE(Has(csv, "\nOurs,1,49,2,31.23,\"[30.88, 31.50]\",-,-,inf")) << csv;
-  EXPECT_TRUE(Has(csv, "\nX,5,49,2,-,-,-0.25,\"[-0.50, -0.10]\",inf")) << csv;
+  EXPECT_TRUE(Contains(csv, "mean of dB,95 %,minus Ours,95 %,dB of mean")) << csv;
+  EXPECT_TRUE(Contains(csv, "\nOurs,1,49,2,31.23,\"[30.88, 31.50]\",-,-,inf")) << csv;
+  EXPECT_TRUE(Contains(csv, "\nX,5,49,2,-,-,-0.25,\"[-0.50, -0.10]\",inf")) << csv;
 }
 
 TEST(Tables, ConsistencyIsNeverAlone) {
   const std::string text = FormatTables(SomeReport(), {});
-  EXPECT_TRUE(Has(text, "Fidelity"));
-  EXPECT_TRUE(Has(text, "styled: fidelity was not measured"));
+  EXPECT_TRUE(Contains(text, "Fidelity"));
+  EXPECT_TRUE(Contains(text, "styled: fidelity was not measured"));
 }
 
 }  // namespace

@@ -113,8 +113,7 @@ TEST(WarpedError, SidesBecomeMultiplesOfEight) {
 }
 
 ConsistencyOptions Options(const std::string& flow) {
-  ConsistencyOptions options;
-  options.mode = kWarpedMode;
+  ConsistencyOptions options{.mode = kWarpedMode};
   options.gaps = {1};
   options.flow = flow;
   return options;

@@ -9,6 +9,7 @@
 #include "pipeline/files/npz_file.h"
 #include "tests/fuzz/fuzz_support.h"
 #include "tests/fuzz/stored_zip.h"
+#include "tests/support/pinhole.h"
 #include "tests/support/small_field.h"
 
 namespace regrade::testing {
@@ -49,9 +50,7 @@ bool ReadField(std::string_view bytes) {
       for (int j = 0; j < 3; ++j) finite = finite && std::isfinite(placement.rotation(i, j));
     }
     FuzzRequire(finite, "its place in the world is finite");
-    Camera camera;
-    camera.width = 4, camera.height = 3;
-    camera.fx = camera.fy = 4, camera.cx = 2, camera.cy = 1.5;
+    Camera camera = testing::PinholeOf(4, 3, 4);
     const Vec3f center = stored.field.geometry->frame.center,
                 radius = stored.field.geometry->frame.radius;
     camera.camera_from_world.translation = {-center.x, -center.y, 2.0 * radius.z - center.z};

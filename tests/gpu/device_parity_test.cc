@@ -17,6 +17,7 @@
 #include "tests/support/device_test.h"
 #include "tests/support/double_field.h"
 #include "tests/support/parity_row.h"
+#include "tests/support/pinhole.h"
 #include "tests/support/small_field.h"
 
 namespace regrade {
@@ -76,12 +77,7 @@ TEST_P(DeviceParity, Render) {
 }
 
 Camera SmallCamera(bool ndc) {
-  Camera camera;
-  camera.width = 37;
-  camera.height = 29;
-  camera.fx = camera.fy = 40;
-  camera.cx = 18;
-  camera.cy = 15;
+  Camera camera = testing::PinholeOf(37, 29, 40, 18, 15);
   camera.camera_from_world.translation = {0.1, -0.05, ndc ? 0.0 : 2.5};
   if (ndc) camera.ndc = {2 * 40.0 / 37, 2 * 40.0 / 29};
   return camera;
@@ -198,38 +194,26 @@ TEST_P(DeviceParity, FitGradient) {
   const Buffer<float> g = DownloadGradient(grid);
   const Buffer<uint32_t> touched = touched_voxels.bits.ToHost();
 
-  std::vector<double> d_density(in_double.density.size()), d_sh(in_double.sh.size());
-  double error = 0;
-  for (int64_t r = 0; r < rays.size(); ++r) {
-    const RayT<double> ray{rays[r].origin.Cast<double>(), rays[r].direction.Cast<double>()};
-    const RayResult<double> result = RenderRay(in_double.view(), ray, options);
-    const Vec3d e = result.color - targets[r].Cast<double>();
-    error += Dot(e, e);
-    RenderRayAdjoint<double>(in_double.view(), ray, options, result, e * (2.0 * scale),
-                             d_density.data(), d_sh.data(), PlainAdd(), nullptr, nullptr,
-                             losses);
-  }
-  Row("loss", basis(), "plain double, relative", std::abs(sums.squared_error - error) / error,
-      1e-5);
-  double largest_density = 0, largest_sh = 0, off_density = 0, off_sh = 0;
-  for (const double d : d_density) largest_density = std::max(largest_density, std::abs(d));
-  for (const double d : d_sh) largest_sh = std::max(largest_sh, std::abs(d));
+  const testing::ExactGradient exact(in_double, rays, targets, options, double{scale}, losses);
+  Row("loss", basis(), "plain double, relative",
+      std::abs(sums.squared_error - exact.error) / exact.error, 1e-5);
+  double off_density = 0, off_sh = 0;
   const int stride = 3 * basis(), lanes = grid.lanes();
   for (int64_t v = 0; v < grid.num_voxels(); ++v) {
     bool any = false;
     for (int k = 0; k < stride; ++k) {
-      off_sh = std::max(off_sh, std::abs(g[v * lanes + k] - d_sh[v * stride + k]));
+      off_sh = std::max(off_sh, std::abs(g[v * lanes + k] - exact.sh[v * stride + k]));
       any = any || g[v * lanes + k] != 0;
     }
-    off_density = std::max(off_density, std::abs(g[v * lanes + stride] - d_density[v]));
+    off_density = std::max(off_density, std::abs(g[v * lanes + stride] - exact.density[v]));
     if (any) {
       ASSERT_NE(touched[v / 32] & (1u << v % 32), 0u) << v;
     }
   }
   Row("gradient of densities", basis(), "plain double, of the largest",
-      off_density / largest_density, 1e-4);
-  Row("gradient of colours", basis(), "plain double, of the largest", off_sh / largest_sh,
-      1e-4);
+      off_density / testing::Largest(exact.density), 1e-4);
+  Row("gradient of colours", basis(), "plain double, of the largest",
+      off_sh / testing::Largest(exact.sh), 1e-4);
 }
 
 TEST_P(DeviceParity, TotalVariation) {

@@ -15,6 +15,7 @@
 #include "tests/support/device_test.h"
 #include "tests/support/double_field.h"
 #include "tests/support/parity_row.h"
+#include "tests/support/pinhole.h"
 #include "tests/support/small_field.h"
 
 namespace regrade {
@@ -22,6 +23,7 @@ namespace {
 
 using testing::AddSpheres;
 using testing::DoubleField;
+using testing::Largest;
 using testing::ParityRow;
 using testing::RandomField;
 using testing::RandomRays;
@@ -38,12 +40,6 @@ Buffer<Ray> Rays(int n, uint64_t seed) {
   const std::vector<Ray> drawn = RandomRays(n, seed);
   std::copy(drawn.begin(), drawn.end(), rays.begin());
   return rays;
-}
-
-double Largest(const std::vector<double>& values) {
-  double largest = 0;
-  for (const double v : values) largest = std::max(largest, std::abs(v));
-  return largest;
 }
 
 class DeviceSpheresParity : public testing::DeviceTestOfBasis {
@@ -100,12 +96,7 @@ TEST_P(DeviceSpheresParity, Render) {
 TEST_P(DeviceSpheresParity, Frame) {
   const RadianceField field = WithLayers(basis(), 0.3);
   const DeviceGrid grid = UploadGrid(MakeFastGrid(field));
-  Camera camera;
-  camera.width = 37;
-  camera.height = 29;
-  camera.fx = camera.fy = 40;
-  camera.cx = 18;
-  camera.cy = 15;
+  Camera camera = testing::PinholeOf(37, 29, 40, 18, 15);
   camera.camera_from_world.translation = {0.1, -0.05, 2.5};
   const MarchOptions options{0.5f, 1e-4f};
   const RenderedView plain = RenderViewPlain(field, camera, options);
@@ -164,32 +155,22 @@ TEST_P(DeviceSpheresParity, FitGradient) {
     const MarchOptions options{0.5f, stop};
     const DeviceGrid fresh = UploadGrid(MakeFastGrid(field), true);
     const Gradients is = Accumulated(fresh, rays, target, options, scale, 1);
-    std::vector<double> d_density(in_double.density.size()), d_sh(in_double.sh.size()),
-        d_sphere_density(in_double.sphere_density.size()),
-        d_sphere_color(in_double.sphere_color.size());
-    double error = 0;
-    for (const Ray& single : rays) {
-      const RayT<double> ray{single.origin.Cast<double>(), single.direction.Cast<double>()};
-      const RayResult<double> result = RenderRay(in_double.view(), ray, options);
-      const Vec3d e = result.color - target.Cast<double>();
-      error += Dot(e, e);
-      RenderRayAdjoint(in_double.view(), ray, options, result, e * (2.0 * scale),
-                       d_density.data(), d_sh.data(), PlainAdd(), d_sphere_density.data(),
-                       d_sphere_color.data());
-    }
+    const testing::ExactGradient exact(in_double, rays, std::vector<Vec3f>(700, target),
+                                       options, double{scale});
     double off_voxels = 0, off_density = 0, off_color = 0;
     for (int64_t v = 0; v < grid.num_voxels(); ++v)
       off_voxels =
           std::max(off_voxels, std::abs(is.voxels[v * grid.lanes() + DensityLane(basis())] -
-                                        d_density[static_cast<size_t>(v)]));
+                                        exact.density[static_cast<size_t>(v)]));
     int64_t with_gradient = 0;
     for (int64_t t = 0; t < grid.spheres.num_texels(); ++t) {
-      off_density = std::max(off_density, std::abs(is.texels[4 * t + 3] -
-                                                   d_sphere_density[static_cast<size_t>(t)]));
+      off_density = std::max(
+          off_density,
+          std::abs(is.texels[4 * t + 3] - exact.sphere_density[static_cast<size_t>(t)]));
       for (int c = 0; c < 3; ++c)
-        off_color = std::max(
-            off_color,
-            std::abs(is.texels[4 * t + c] - d_sphere_color[static_cast<size_t>(3 * t + c)]));
+        off_color =
+            std::max(off_color, std::abs(is.texels[4 * t + c] -
+                                         exact.sphere_color[static_cast<size_t>(3 * t + c)]));
       if (is.texels[4 * t + 3] == 0) continue;
       ++with_gradient;
       const int64_t point = grid.first_texel() + t;
@@ -200,12 +181,13 @@ TEST_P(DeviceSpheresParity, FitGradient) {
     const double most = 1e-4 + 3 * static_cast<double>(stop);
     const char* against = stop > 0 ? "plain double, of the largest, rays stopped"
                                    : "plain double, of the largest";
-    Row("loss before layers", against, std::abs(is.sums.squared_error - error) / error,
-        stop > 0 ? most : 1e-5);
-    Row("gradient of densities before layers", against, off_voxels / Largest(d_density), most);
-    Row("gradient of layers' densities", against, off_density / Largest(d_sphere_density),
+    Row("loss before layers", against,
+        std::abs(is.sums.squared_error - exact.error) / exact.error, stop > 0 ? most : 1e-5);
+    Row("gradient of densities before layers", against, off_voxels / Largest(exact.density),
         most);
-    Row("gradient of layers' colours", against, off_color / Largest(d_sphere_color), most);
+    Row("gradient of layers' densities", against, off_density / Largest(exact.sphere_density),
+        most);
+    Row("gradient of layers' colours", against, off_color / Largest(exact.sphere_color), most);
   }
 }
 
@@ -272,9 +254,7 @@ TEST_P(DeviceSpheresParity, Step) {
   marks.bits.CopyIn(touched.data(), touched.size());
   DeviceBuffer<DeviceFitSums> sums(1, "sums");
   sums.Zero();
-  RmspropOptions options;
-  options.rate_sphere_density = 0.5f;
-  options.rate_sphere_color = 0.3f;
+  RmspropOptions options{.rate_sphere_density = 0.5f, .rate_sphere_color = 0.3f};
   StepSpheresOnDevice(&grid, &marks, options, sums.data());
   const FastSpheres after = DownloadSpheres(grid.spheres);
   DeviceFitSums taken;

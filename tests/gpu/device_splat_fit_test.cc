@@ -145,7 +145,7 @@ TEST_F(DeviceSplatFit, StepsAreThoseOfTheHost) {
     const Splats device = FitSplats(views_, box_, fit_, hooks, Backend::kCuda).splats;
     EXPECT_EQ(device.count(), host.count());
     EXPECT_EQ(device.basis, host.basis);
-    EXPECT_GT(testing::Psnr(pictures[1], pictures[0]), 35) << degree;
+    EXPECT_GT(DecibelsBetween(pictures[1], pictures[0]), 35) << degree;
   }
 }
 
@@ -154,7 +154,7 @@ TEST_F(DeviceSplatFit, ReproducesAHeldOutViewWithTheSameBitsEachTime) {
   std::vector<double> psnr;
   SplatFitHooks hooks;
   hooks.measure = [&](SplatEngine* engine) {
-    psnr.push_back(testing::Psnr(engine->Render(cameras_[0]).color, photos_[0]));
+    psnr.push_back(DecibelsBetween(engine->Render(cameras_[0]).color, photos_[0]));
   };
   const Splats once = FitSplats(views_, box_, fit_, hooks, Backend::kCuda).splats;
   const Splats again = FitSplats(views_, box_, fit_, hooks, Backend::kCuda).splats;
@@ -163,7 +163,7 @@ TEST_F(DeviceSplatFit, ReproducesAHeldOutViewWithTheSameBitsEachTime) {
   Image background(48, 48);
   for (size_t i = 0; i < background.pixels.size(); ++i)
     background.pixels[i] = truth_.background[static_cast<int>(i % 3)];
-  EXPECT_GT(psnr[0], testing::Psnr(background, photos_[0]) + 12);
+  EXPECT_GT(psnr[0], DecibelsBetween(background, photos_[0]) + 12);
 }
 
 TEST_F(DeviceSplatFit, FrozenSplatsKeepTheirBits) {

@@ -113,8 +113,7 @@ TEST_F(DeviceSplatsTest, RendersAsTheCpu) {
   for (const Scene& scene : Scenes())
     for (const auto& [width, height] : {std::pair{75, 50}, {8, 8}, {1, 3}, {131, 97}})
       for (const bool antialiased : {false, true}) {
-        SplatOptions options;
-        options.fit_pixel = antialiased ? 0 : -1;
+        SplatOptions options{.fit_pixel = antialiased ? 0.0f : -1.0f};
         const Camera camera = SplatCameraOf(width, height);
         const auto exact = RenderSplats(MakeSplatFrame(scene.splats.view(), camera, options));
         device.Upload(scene.splats);
@@ -150,8 +149,7 @@ TEST_F(DeviceSplatsTest, GradientsAsOnTheCpu) {
     for (const auto& [width, height] : {std::pair{75, 50}, {131, 97}})
       for (const bool antialiased : {false, true})
         for (const bool depth : {true, false}) {
-          SplatOptions options;
-          options.fit_pixel = antialiased ? 0 : -1;
+          SplatOptions options{.fit_pixel = antialiased ? 0.0f : -1.0f};
           const Camera camera = SplatCameraOf(width, height);
           SplatPicture<float> d = RandomGradient(camera);
           if (!depth) std::fill(d.depth.begin(), d.depth.end(), 0.0f);

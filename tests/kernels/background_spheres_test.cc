@@ -258,40 +258,29 @@ TEST_P(FastSpheresParity, GradientsAsThePlainAdjointInDouble) {
   functions_->accumulate(grid,
                          {rays_.data(), targets.data(), static_cast<int64_t>(rays_.size())},
                          options, scale, &arena);
-  std::vector<double> d_density(d.density.size()), d_sh(d.sh.size()),
-      d_sphere_density(d.sphere_density.size()), d_sphere_color(d.sphere_color.size());
-  for (size_t r = 0; r < rays_.size(); ++r) {
-    const RayT<double> ray{rays_[r].origin.Cast<double>(), rays_[r].direction.Cast<double>()};
-    const RayResult<double> result = RenderRay(d.view(), ray, options);
-    const Vec3d e = result.color - targets[r].Cast<double>();
-    RenderRayAdjoint(d.view(), ray, options, result, e * (2.0 * scale), d_density.data(),
-                     d_sh.data(), PlainAdd(), d_sphere_density.data(), d_sphere_color.data());
-  }
-  const auto largest = [](const std::vector<double>& values) {
-    double most = 0;
-    for (const double v : values) most = std::max(most, std::abs(v));
-    return most;
-  };
-  const double most_density = largest(d_sphere_density), most_color = largest(d_sphere_color);
-  const double most_voxel = largest(d_density);
+  const testing::ExactGradient exact(d, rays_, targets, options, double{scale});
+  const double most_density = testing::Largest(exact.sphere_density),
+               most_color = testing::Largest(exact.sphere_color),
+               most_voxel = testing::Largest(exact.density);
   ASSERT_GT(most_density, 0);
   for (int64_t t = 0; t < grid.spheres.num_texels(); ++t) {
     const int32_t slot = arena.spheres.slot_of_texel[t];
     const float* g = slot < 0 ? nullptr : arena.spheres.gradient.data() + 4 * slot;
-    const double by_density = g ? g[3] : 0, expected = d_sphere_density[static_cast<size_t>(t)];
+    const double by_density = g ? g[3] : 0,
+                 expected = exact.sphere_density[static_cast<size_t>(t)];
     ASSERT_NEAR(
         by_density, expected,
         testing::RecordDigits("gradient by texels, of its largest", testing::Computed::kFloat,
                               by_density - expected, 1e-4, most_density));
     for (int c = 0; c < 3; ++c)
-      ASSERT_NEAR(g ? g[c] : 0, d_sphere_color[static_cast<size_t>(3 * t + c)],
+      ASSERT_NEAR(g ? g[c] : 0, exact.sphere_color[static_cast<size_t>(3 * t + c)],
                   1e-4 * most_color);
   }
   // The radiance behind the box enters the gradients of the box's densities.
   for (int64_t v = 0; v < grid.num_voxels(); ++v) {
     const int32_t slot = arena.slot_of_voxel[v];
     const float* g = slot < 0 ? nullptr : arena.gradient.data() + slot * grid.lanes();
-    ASSERT_NEAR(g ? g[DensityLane(grid.basis)] : 0, d_density[static_cast<size_t>(v)],
+    ASSERT_NEAR(g ? g[DensityLane(grid.basis)] : 0, exact.density[static_cast<size_t>(v)],
                 1e-4 * most_voxel);
   }
 }

@@ -13,6 +13,7 @@
 #include <sstream>
 
 #include "kernels/base/error.h"
+#include "tests/support/expect_error.h"
 #include "tests/support/process_state.h"
 
 namespace regrade {
@@ -56,13 +57,8 @@ TEST(ChildProcess, ExitStatusAndBothOutputs) {
 }
 
 TEST(ChildProcess, F45_MissingProgramIsAnErrorWithTheReason) {
-  try {
-    RunChild({.argv = {"/no/such/program"}});
-    FAIL();
-  } catch (const Error& e) {
-    EXPECT_EQ(e.code(), ExitCode::kExternalProgram);
-    EXPECT_NE(e.what_failed().find("No such file"), std::string::npos) << e.what();
-  }
+  EXPECT_REGRADE_ERROR(RunChild({.argv = {"/no/such/program"}}), ExitCode::kExternalProgram,
+                       "No such file");
   EXPECT_THROW(RunChild({.argv = {"/etc/passwd"}}), Error);  // there, but not executable
 }
 

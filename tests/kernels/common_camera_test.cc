@@ -6,16 +6,13 @@
 #include <algorithm>
 #include <cmath>
 
+#include "tests/support/pinhole.h"
+
 namespace regrade {
 namespace {
 
 Camera PhotoOf(int width, int height, double focal) {
-  Camera camera;
-  camera.width = width;
-  camera.height = height;
-  camera.fx = camera.fy = focal;
-  camera.cx = 0.5 * width;
-  camera.cy = 0.5 * height;
+  Camera camera = testing::PinholeOf(width, height, focal);
   return camera;
 }
 

@@ -86,24 +86,12 @@ TEST(DensityLosses, FastPathsEqualThePlainAdjoint) {
   const std::vector<Vec3f> targets(rays.size(), Vec3f{0.4f, 0.5f, 0.2f});
   const MarchOptions options{0.5f, 1e-4f};
   const float scale = 1.0f / 600;
-  std::vector<double> d_density(d.density.size()), d_sh(d.sh.size()), without;
-  for (const DensityLosses& losses : {DensityLosses(), kLosses}) {
-    without = d_density;
-    std::ranges::fill(d_density, 0);
-    for (size_t r = 0; r < rays.size(); ++r) {
-      const RayT<double> ray = ToDouble(rays[r]);
-      const RayResult<double> result = RenderRay(d.view(), ray, options);
-      RenderRayAdjoint<double>(d.view(), ray, options, result,
-                               (result.color - targets[r].Cast<double>()) * (2.0 * scale),
-                               d_density.data(), d_sh.data(), PlainAdd(), nullptr, nullptr,
-                               losses);
-    }
-  }
-  double largest = 0, change = 0;
-  for (size_t v = 0; v < d_density.size(); ++v) {
-    largest = std::max(largest, std::abs(d_density[v]));
-    change = std::max(change, std::abs(d_density[v] - without[v]));
-  }
+  const testing::ExactGradient without(d, rays, targets, options, double{scale}),
+      exact(d, rays, targets, options, double{scale}, kLosses);
+  const double largest = testing::Largest(exact.density);
+  double change = 0;
+  for (size_t v = 0; v < exact.density.size(); ++v)
+    change = std::max(change, std::abs(exact.density[v] - without.density[v]));
   EXPECT_GT(change, 0.1 * largest);  // the losses count here
   for (const char* name : {"baseline", "avx2", "avx512"}) {
     const FastRayFunctions* functions = FastRaysFor(name);
@@ -116,7 +104,7 @@ TEST(DensityLosses, FastPathsEqualThePlainAdjoint) {
       const int32_t slot = arena.slot_of_voxel[v];
       const double fast =
           slot < 0 ? 0 : arena.gradient[int64_t{slot} * grid.lanes() + DensityLane(grid.basis)];
-      ASSERT_NEAR(fast, d_density[static_cast<size_t>(v)], 1e-4 * largest) << name;
+      ASSERT_NEAR(fast, exact.density[static_cast<size_t>(v)], 1e-4 * largest) << name;
     }
   }
 }

@@ -15,6 +15,7 @@
 #include "kernels/field/render_ray.h"
 #include "tests/support/derivative.h"
 #include "tests/support/double_field.h"
+#include "tests/support/pinhole.h"
 #include "tests/support/record_error.h"
 #include "tests/support/small_field.h"
 #include "tests/support/threads.h"
@@ -24,7 +25,9 @@ namespace {
 
 using testing::DerivativeBy;
 using testing::DoubleField;
+using testing::ExactGradient;
 using testing::kKink;
+using testing::Largest;
 using testing::RandomField;
 using testing::RandomRays;
 using testing::ToDouble;
@@ -114,38 +117,27 @@ TEST_P(FastRaysParity, GradientsAsThePlainAdjointInDouble) {
   const FitStepResult step = functions()->accumulate(
       grid, {rays.data(), targets.data(), static_cast<int64_t>(rays.size())}, options, scale,
       &arena);
-  std::vector<double> d_density(d.density.size()), d_sh(d.sh.size());
-  double error = 0;
-  for (size_t r = 0; r < rays.size(); ++r) {
-    const RayT<double> ray{rays[r].origin.Cast<double>(), rays[r].direction.Cast<double>()};
-    const RayResult<double> result = RenderRay(d.view(), ray, options);
-    const Vec3d e = result.color - targets[r].Cast<double>();
-    error += Dot(e, e);
-    RenderRayAdjoint(d.view(), ray, options, result, e * (2.0 * scale), d_density.data(),
-                     d_sh.data(), PlainAdd());
-  }
+  const ExactGradient exact(d, rays, targets, options, double{scale});
   EXPECT_NEAR(
-      step.squared_error, error,
+      step.squared_error, exact.error,
       testing::RecordDigits("loss against the plain ray in double", testing::Computed::kFloat,
-                            step.squared_error - error, 1e-4, error));
-  double largest_density = 0, largest_sh = 0;
-  for (const double g : d_density) largest_density = std::max(largest_density, std::abs(g));
-  for (const double g : d_sh) largest_sh = std::max(largest_sh, std::abs(g));
+                            step.squared_error - exact.error, 1e-4, exact.error));
+  const double largest_density = Largest(exact.density), largest_sh = Largest(exact.sh);
   const int stride = 3 * basis();
   for (int64_t voxel = 0; voxel < grid.num_voxels(); ++voxel) {
     const int32_t slot = arena.slot_of_voxel[voxel];
     const float* g = slot < 0 ? nullptr : arena.gradient.data() + slot * grid.lanes();
     const double by_density = g ? g[DensityLane(basis())] : 0;
-    ASSERT_NEAR(by_density, d_density[voxel],
-                testing::RecordDigits("gradient by densities, of its largest",
-                                      testing::Computed::kFloat, by_density - d_density[voxel],
-                                      1e-4, largest_density));
+    ASSERT_NEAR(by_density, exact.density[voxel],
+                testing::RecordDigits(
+                    "gradient by densities, of its largest", testing::Computed::kFloat,
+                    by_density - exact.density[voxel], 1e-4, largest_density));
     for (int k = 0; k < stride; ++k) {
       const double by_color = g ? g[k] : 0;
-      ASSERT_NEAR(by_color, d_sh[voxel * stride + k],
-                  testing::RecordDigits("gradient by colours, of its largest",
-                                        testing::Computed::kFloat,
-                                        by_color - d_sh[voxel * stride + k], 1e-4, largest_sh));
+      ASSERT_NEAR(by_color, exact.sh[voxel * stride + k],
+                  testing::RecordDigits(
+                      "gradient by colours, of its largest", testing::Computed::kFloat,
+                      by_color - exact.sh[voxel * stride + k], 1e-4, largest_sh));
     }
   }
 }
@@ -294,12 +286,7 @@ TEST(RayWeights, GiveTheRenderedColour) {
 // H67: a pixel does not depend on the partition of the picture into tiles.
 TEST(RenderView, H67_TilesAndThePlainBodyAgree) {
   const RadianceField field = RandomField({16, 16, 16}, 9, 0.5, 81);
-  Camera camera;
-  camera.width = 37;
-  camera.height = 29;
-  camera.fx = camera.fy = 40;
-  camera.cx = 18.5;
-  camera.cy = 14.5;
+  Camera camera = testing::PinholeOf(37, 29, 40);
   camera.camera_from_world.translation = {0, 0, 3};
   const RenderedView fast = RenderView(field, camera, {0.5f, 1e-4f});
   const RenderedView plain = RenderViewPlain(field, camera, {0.5f, 1e-4f});

@@ -10,6 +10,7 @@
 #include "kernels/field/spherical_harmonics.h"
 #include "kernels/field/trilinear.h"
 #include "tests/support/floating_point_traps.h"
+#include "tests/support/pinhole.h"
 #include "tests/support/record_error.h"
 #include "tests/support/small_field.h"
 
@@ -256,10 +257,7 @@ TEST(SphericalHarmonics, H95_RaysOfEveryLensAreUnit) {
   // normalises rays once; rounding to float leaves an error of 2e-7 in the square.
   for (const LensModel lens : {LensModel::kPinhole, LensModel::kOpenCv, LensModel::kFisheye})
     for (const bool ndc : {false, true}) {
-      Camera camera;
-      camera.width = 400, camera.height = 300;
-      camera.fx = camera.fy = 300;
-      camera.cx = 190, camera.cy = 160;
+      Camera camera = testing::PinholeOf(400, 300, 300, 190, 160);
       camera.lens = lens;
       if (lens == LensModel::kOpenCv) camera.distortion = {-0.1, 0.02, 0.001, -0.002};
       if (ndc) camera.ndc = {1.5, 2};

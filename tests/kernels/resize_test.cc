@@ -5,23 +5,17 @@
 #include <numeric>
 
 #include "kernels/base/random.h"
+#include "tests/support/pictures.h"
 
 namespace regrade {
 namespace {
-
-Image Noise(int width, int height, int channels) {
-  Image image(width, height, channels);
-  for (size_t i = 0; i < image.pixels.size(); ++i)
-    image.pixels[i] = static_cast<float>(RandomDouble(3, 1, i));
-  return image;
-}
 
 double Mean(const Image& image) {
   return std::accumulate(image.pixels.begin(), image.pixels.end(), 0.0) / image.pixels.size();
 }
 
 TEST(Resize, SameSizeIsBitwiseTheSame) {
-  const Image image = Noise(17, 9, 3);
+  const Image image = testing::NoiseImage(17, 9, 3, 3);
   EXPECT_EQ(Resize(image, 17, 9).pixels, image.pixels);
 }
 
@@ -35,7 +29,7 @@ TEST(Resize, ShrinkingByCoverageIsExact) {
 }
 
 TEST(Resize, ShrinkingKeepsTheMean) {
-  const Image image = Noise(101, 67, 3);
+  const Image image = testing::NoiseImage(101, 67, 3, 3);
   for (const auto& [w, h] : {std::pair{50, 67}, {7, 5}, {1, 1}, {100, 66}})
     // Float rounding of independent pixels: far below 1e-7 in the mean.
     EXPECT_NEAR(Mean(Resize(image, w, h)), Mean(image), 1e-7) << w << "x" << h;

@@ -23,8 +23,7 @@ TEST(SplatExtent, NoPixelOutsideSeesTheSplatAndTheSidesAreReached) {
   const Camera camera = SplatCameraOf(60, 40);
   const SplatCamera own(camera);
   for (const bool antialiased : {false, true}) {
-    SplatOptions options;
-    options.fit_pixel = antialiased ? 0 : -1;
+    SplatOptions options{.fit_pixel = antialiased ? 0.0f : -1.0f};
     SplatArrays<double> splats = RandomSplats(300, 1, 67, 1.8, 0.01);
     for (size_t i = 0; i < 100; ++i) splats.log_scale[3 * i] += 3;  // some are long
     const SplatArrays<float> values = CastSplats<float>(splats);

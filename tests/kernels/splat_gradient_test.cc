@@ -50,8 +50,7 @@ class SplatGradient : public ::testing::TestWithParam<std::tuple<int, bool, floa
 TEST_P(SplatGradient, AdjointEqualsDerivativeInDouble) {
   const auto [basis, antialiased, dropout] = GetParam();
   const Camera camera = SplatCameraOf(13, 10);
-  SplatOptions options;
-  options.fit_pixel = antialiased ? 0 : -1;
+  SplatOptions options{.fit_pixel = antialiased ? 0.0f : -1.0f};
   options.dropout = SplatDropout(dropout, 3, 4);
   const SplatPicture<double> d = RandomAdjoint<double>(camera);
   int checked = 0, not_zero = 0, all = 0, limited = 0;
@@ -208,8 +207,7 @@ void ExpectDigits(const SplatArrays<float>& got, const SplatArrays<double>& exac
 TEST(SplatGradientInFloat, AgreesWithDouble) {
   const Camera camera = SplatCameraOf(40, 30);
   for (const bool antialiased : {false, true}) {
-    SplatOptions options;
-    options.fit_pixel = antialiased ? 0 : -1;
+    SplatOptions options{.fit_pixel = antialiased ? 0.0f : -1.0f};
     const SplatArrays<double> splats = RoundedToFloat(RandomSplats(300, 16, 41));
     const SplatArrays<double> exact =
         RenderSplatsPlainAdjoint(splats.view(), camera, options, RandomAdjoint<double>(camera));
@@ -225,8 +223,7 @@ TEST(SplatGradientInFloat, AgreesWithDouble) {
 TEST(SplatGradientInFloat, NeedlesKeepTheirDigits) {
   const Camera camera = SplatCameraOf(40, 30);
   for (const bool antialiased : {false, true}) {
-    SplatOptions options;
-    options.fit_pixel = antialiased ? 0 : -1;
+    SplatOptions options{.fit_pixel = antialiased ? 0.0f : -1.0f};
     SplatArrays<double> splats = RandomSplats(60, 4, 43);
     for (size_t i = 0; i < 60; ++i) {
       splats.opacity_logit[i] = 3;

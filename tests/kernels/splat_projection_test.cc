@@ -9,13 +9,13 @@
 #include "kernels/splats/compositing.h"
 #include "kernels/splats/projection.h"
 #include "tests/support/derivative.h"
+#include "tests/support/pinhole.h"
 #include "tests/support/record_error.h"
 #include "tests/support/small_splats.h"
 
 namespace regrade {
 namespace {
 
-using testing::CastSplats;
 using testing::Draw;
 using testing::RandomSplats;
 using testing::RoundedToFloat;
@@ -170,8 +170,7 @@ TEST(SplatProjection, IsTheDefinitionsEllipse) {
 
 // w of pixels near a splat, in float against double.
 double WorstOffset(const SplatArrays<double>& splats, const Camera& camera, double* filter) {
-  SplatOptions options;
-  options.fit_pixel = 0;
+  SplatOptions options{.fit_pixel = 0};
   double worst = 0;
   for (int64_t i = 0; i < splats.count(); ++i) {
     const Splat<double> exact_splat = splats.view()[i];
@@ -227,8 +226,7 @@ TEST(SplatProjection, ADiscSeenEdgeOnHasTheBlursWidth) {
   camera.camera_from_world.rotation = Mat3d();
   camera.camera_from_world.translation = {0, 0, 3};
   camera.cx = 30, camera.cy = 20;
-  SplatOptions options;
-  options.fit_pixel = 0;
+  SplatOptions options{.fit_pixel = 0};
   const Splat<float> disc{{0, 0, 0}, {std::log(0.5f), -50, std::log(0.5f)}, {1, 0, 0, 0}, 4};
   SplatProjection<float> p;
   ASSERT_TRUE(ProjectSplat(SplatCamera(camera), options, disc, &p));
@@ -302,10 +300,7 @@ TEST(SplatProjection, NearerThanTheNearPlaneIsLeftOut) {
 
 // At the right end of a picture 16k wide, in float, as at its left end.
 TEST(SplatProjection, WidePicturesKeepTheDigitsOfOffsets) {
-  Camera camera;
-  camera.width = 16384, camera.height = 4;
-  camera.fx = camera.fy = 9000;
-  camera.cx = 8192, camera.cy = 2;
+  Camera camera = testing::PinholeOf(16384, 4, 9000);
   camera.camera_from_world.translation = {0, 0, 0};
   const SplatCamera own(camera);
   double worst = 0;

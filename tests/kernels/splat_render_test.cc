@@ -11,6 +11,7 @@
 #include "kernels/splats/render_picture.h"
 #include "tests/support/expect_error.h"
 #include "tests/support/floating_point_traps.h"
+#include "tests/support/pinhole.h"
 #include "tests/support/record_error.h"
 #include "tests/support/small_splats.h"
 #include "tests/support/threads.h"
@@ -26,10 +27,7 @@ using testing::SplatCameraOf;
 
 // Looks along z from the origin, 100 pixels a unit of slope, the axis through a pixel's centre.
 Camera StraightCamera(int size) {
-  Camera camera;
-  camera.width = camera.height = size;
-  camera.fx = camera.fy = 100;
-  camera.cx = camera.cy = size / 2 + 0.5;
+  Camera camera = testing::PinholeOf(size, size, 100, size / 2 + 0.5, size / 2 + 0.5);
   return camera;
 }
 
@@ -193,8 +191,7 @@ TEST(SplatRender, ALargerPictureIsTheFitsPictureEnlarged) {
   Camera large = small;
   large.width *= 3, large.height *= 3;
   large.fx *= 3, large.fy *= 3, large.cx *= 3, large.cy *= 3;
-  SplatOptions options;
-  options.fit_pixel = 1 / std::sqrt(small.fx * small.fy);
+  SplatOptions options{.fit_pixel = 1 / std::sqrt(small.fx * small.fy)};
   const SplatArrays<double> splats = RandomSplats(60, 4, 83);
   const auto fit = RenderSplatsPlain(splats.view(), small, options);
   const auto enlarged = RenderSplatsPlain(splats.view(), large, options);
@@ -228,8 +225,7 @@ TEST(SplatRender, ASmallerPictureKeepsTheFitsLight) {
 TEST(SplatRender, FloatAgreesWithDoubleOverTenThousandSplatsOnOneRay) {
   const Camera camera = StraightCamera(5);
   for (const bool antialiased : {false, true}) {
-    SplatOptions options;
-    options.fit_pixel = antialiased ? 0 : -1;
+    SplatOptions options{.fit_pixel = antialiased ? 0.0f : -1.0f};
     SplatArrays<double> splats = RandomSplats(10000, 4, 84, 0.2, 2);
     for (size_t i = 0; i < 10000; ++i) {
       splats.mean[3 * i + 2] = Draw(85, i, 0, 1, 50);
@@ -267,8 +263,7 @@ TEST(SplatRender, FloatAgreesWithDoubleInRandomScenes) {
   int decided_otherwise = 0;
   for (const bool antialiased : {false, true})
     for (const double spread : {0.8, 3.0}) {  // the second is around the camera, too
-      SplatOptions options;
-      options.fit_pixel = antialiased ? 0 : -1;
+      SplatOptions options{.fit_pixel = antialiased ? 0.0f : -1.0f};
       const SplatArrays<double> splats = RoundedToFloat(RandomSplats(800, 16, 86, spread));
       const auto exact = RenderSplatsPlain(splats.view(), camera, options);
       const auto got = RenderSplatsPlain(CastSplats<float>(splats).view(), camera, options);

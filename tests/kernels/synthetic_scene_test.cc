@@ -11,6 +11,8 @@
 #include "kernels/base/random.h"
 #include "kernels/synthetic/ray_trace.h"
 #include "kernels/synthetic/solid_index.h"
+#include "tests/support/expect_error.h"
+#include "tests/support/pinhole.h"
 #include "tests/support/threads.h"
 
 namespace regrade {
@@ -211,10 +213,7 @@ TEST(SyntheticScene, VisibleMeansUnoccluded) {
   ball.center = {0, 0, 0};
   ball.half = {0.4, 0, 0};
   scene.solids = {wall, ball};
-  Camera from;
-  from.width = from.height = 100;
-  from.fx = from.fy = 100;
-  from.cx = from.cy = 50;
+  Camera from = testing::PinholeOf(100, 100, 100);
   from.camera_from_world.rotation.row[0] = {1, 0, 0};
   from.camera_from_world.rotation.row[1] = {0, 0, -1};
   from.camera_from_world.rotation.row[2] = {0, 1, 0};
@@ -250,13 +249,7 @@ TEST(SyntheticScene, HighlightsDependOnTheViewAndAreOffBitwise) {
 }
 
 TEST(SyntheticScene, UnknownNameIsUsageAndListsTheScenes) {
-  try {
-    MakeSyntheticScene("garden", 0);
-    FAIL();
-  } catch (const Error& error) {
-    EXPECT_EQ(error.code(), ExitCode::kUsage);
-    EXPECT_NE(error.hint().find("table|wall|room"), std::string::npos);
-  }
+  EXPECT_REGRADE_ERROR(MakeSyntheticScene("garden", 0), ExitCode::kUsage, "table|wall|room");
 }
 
 }  // namespace

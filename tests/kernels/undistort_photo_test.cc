@@ -5,16 +5,13 @@
 #include <cmath>
 #include <cstring>
 
+#include "tests/support/pinhole.h"
+
 namespace regrade {
 namespace {
 
 Camera Lens(double k1) {
-  Camera camera;
-  camera.width = 96;
-  camera.height = 64;
-  camera.fx = camera.fy = 70;
-  camera.cx = 47;
-  camera.cy = 33;
+  Camera camera = testing::PinholeOf(96, 64, 70, 47, 33);
   camera.lens = LensModel::kOpenCv;
   camera.distortion[0] = k1;
   camera.distortion[2] = 1e-3;

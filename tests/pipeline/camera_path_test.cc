@@ -8,6 +8,7 @@
 #include <memory>
 
 #include "kernels/render/optical_depth.h"
+#include "kernels/scene/facing.h"
 #include "kernels/splats/splat_field.h"
 #include "pipeline/fields/film_timing.h"
 #include "pipeline/fields/path_clearance.h"
@@ -29,10 +30,7 @@ std::vector<Camera> Arc(int n, bool shuffled) {
     c.fx = c.fy = 60;
     c.cx = 30;
     c.cy = 25;
-    c.camera_from_world.rotation.row[0] = right;
-    c.camera_from_world.rotation.row[1] = Cross(forward, right);
-    c.camera_from_world.rotation.row[2] = forward;
-    c.camera_from_world.translation = -(c.camera_from_world.rotation * center);
+    c.camera_from_world = Facing(center, forward, right);
   }
   return cameras;
 }

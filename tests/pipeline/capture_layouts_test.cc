@@ -19,6 +19,7 @@ namespace {
 
 namespace fs = std::filesystem;
 using testing::ExitCodeOf;
+using testing::PoseCode;
 using testing::TemporaryFolder;
 using testing::WriteText;
 
@@ -43,9 +44,7 @@ class CaptureLayouts : public ::testing::Test {
 
   // The poses of `capture` as regrade stores them.
   Capture Pose(const std::string& capture, const std::string& out) const {
-    EXPECT_EQ(
-        ExitCodeOf({"pose", folder_ / capture, "--out", folder_ / out, "--tracks", "given"}),
-        0);
+    EXPECT_EQ(PoseCode(folder_ / capture, folder_ / out), 0);
     return ReadCapture(folder_ / (out + "/poses"));
   }
 
@@ -135,8 +134,7 @@ TEST_F(CaptureLayouts, NsvfWithoutPrefixesHasNoSplit) {
   EXPECT_FALSE(capture.box.has_value());
   // A pose that is damaged is refused.
   WriteText(folder_ / "n/poses/a0.txt", "1 0 0 0\n0 1 0 0\n");
-  EXPECT_EQ(
-      ExitCodeOf({"pose", folder_ / "n", "--out", folder_ / "other", "--tracks", "given"}), 3);
+  EXPECT_EQ(PoseCode(folder_ / "n", folder_ / "other"), 3);
 }
 
 TEST_F(CaptureLayouts, DtusNumberedCameras) {
@@ -228,12 +226,10 @@ TEST_F(CaptureLayouts, NerfstudiosMasksAndTestPhotos) {
   EXPECT_EQ(ReadImage(folder_ / "out/poses/masks/00005.png.png").pixels, mask.pixels);
   EXPECT_FALSE(fs::exists(folder_ / "out/poses/masks/00004.png.png"));
   // Another mask is another input.
-  EXPECT_EQ(ExitCodeOf({"pose", folder_ / "f", "--out", folder_ / "out", "--tracks", "given"}),
-            0);
+  EXPECT_EQ(PoseCode(folder_ / "f", folder_ / "out"), 0);
   mask.pixels[96 * 20] = 1;
   WritePng8(folder_ / "f/masks/m5.png", mask);
-  EXPECT_EQ(ExitCodeOf({"pose", folder_ / "f", "--out", folder_ / "out", "--tracks", "given"}),
-            3);
+  EXPECT_EQ(PoseCode(folder_ / "f", folder_ / "out"), 3);
 }
 
 TEST_F(CaptureLayouts, PolycamsCameras) {
@@ -265,17 +261,14 @@ TEST_F(CaptureLayouts, PolycamsCameras) {
     EXPECT_NEAR(found.fy, truth.fy, 1e-9);
   }
   WriteText(folder_ / "p/keyframes/corrected_cameras/170000.json", "{\"fx\": 1}");
-  EXPECT_EQ(
-      ExitCodeOf({"pose", folder_ / "p", "--out", folder_ / "other", "--tracks", "given"}), 3);
+  EXPECT_EQ(PoseCode(folder_ / "p", folder_ / "other"), 3);
 }
 
 // The output folder may be inside the folder of photos: the same command goes on.
 TEST_F(CaptureLayouts, ResultsInsideThePhotosAreNoPhotos) {
   const std::vector<std::string> pose{
       "pose", folder_ / "all", "--out", folder_ / "all/images/out", "--tracks", "given"};
-  ASSERT_EQ(ExitCodeOf(
-                {"pose", folder_ / "s/truth", "--out", folder_ / "first", "--tracks", "given"}),
-            0);
+  ASSERT_EQ(PoseCode(folder_ / "s/truth", folder_ / "first"), 0);
   ASSERT_EQ(ExitCodeOf({"export", folder_ / "first", "--out", folder_ / "all"}), 0);
   for (int i = 0; i < 2; ++i) {
     ASSERT_EQ(ExitCodeOf(pose), 0) << i;

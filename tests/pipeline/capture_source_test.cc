@@ -85,15 +85,8 @@ TEST_F(CaptureFolder, PicturesFarFromTheCameraFileAreRefused) {
         std::string("..\\..\\Pictures\\private.png"), folder_ / "Pictures/private.png",
         std::string("/nowhere/0.png")}) {
     WriteTransforms({"images/0.png", name});
-    try {
-      Detect();
-      ADD_FAILURE() << name << " is taken";
-    } catch (const Error& error) {
-      EXPECT_EQ(error.code(), ExitCode::kInput) << name;
-      EXPECT_TRUE(
-          error.where().starts_with(fs::canonical(root_).string() + "/transforms.json:3:"))
-          << error.where();
-    }
+    EXPECT_REGRADE_ERROR(Detect(), ExitCode::kInput,
+                         fs::canonical(root_).string() + "/transforms.json:3:");
     // So are masks, whether their photo is there or not.
     WriteTransforms({"images/0.png"}, "", ",\"mask_path\":" + DumpJson(JsonValue(name), -1));
     EXPECT_REGRADE_ERROR(Detect(), ExitCode::kInput, "neither in the folder");
@@ -136,14 +129,7 @@ TEST_F(CaptureFolder, APictureIsListedOnce) {
   for (const char* again :
        {"./images/3.jpg", "images/3", "images\\3.jpg", "images/x/../3.jpg"}) {
     WriteTransforms({"images/3.jpg", again});
-    try {
-      Detect();
-      ADD_FAILURE() << again;
-    } catch (const Error& error) {
-      EXPECT_EQ(error.code(), ExitCode::kInput);
-      EXPECT_NE(error.where().find("/transforms.json:3:"), std::string::npos);
-      EXPECT_NE(error.what_failed().find("listed twice"), std::string::npos);
-    }
+    EXPECT_REGRADE_ERROR(Detect(), ExitCode::kInput, "/transforms.json:3:", "listed twice");
   }
 }
 
@@ -212,13 +198,7 @@ TEST_F(CaptureFolder, PhotosForTestsByName) {
        {R"(,"train_filenames":["images/1.png"],"test_filenames":["images/1.png"])",
         R"(,"test_filenames":["images/9.png"])", R"(,"test_filenames":[7])",
         R"(,"val_filenames":"images/1.png")"})
-    try {
-      detect(wrong);
-      ADD_FAILURE() << wrong;
-    } catch (const Error& error) {
-      EXPECT_EQ(error.code(), ExitCode::kInput);
-      EXPECT_NE(error.where().find("transforms.json:1:"), std::string::npos) << error.where();
-    }
+    EXPECT_REGRADE_ERROR(detect(wrong), ExitCode::kInput, "transforms.json:1:");
 }
 
 TEST_F(CaptureFolder, TheLargestColmapModelIsTaken) {
@@ -357,17 +337,15 @@ TEST_F(ColmapNames, AnExactNameComesFirst) {
 
 TEST_F(ColmapNames, TheUsersNamesAreTold) {
   std::vector<std::string> notes;
-  try {
+  const Error error = testing::ErrorFrom([&] {
     Import({"shot_0001.png"}, {"shot0001.jpg", "other.jpg", "more.jpg"}, &notes);
-    FAIL() << "accepted";
-  } catch (const Error& error) {
-    EXPECT_EQ(error.code(), ExitCode::kInput);
-    EXPECT_EQ(error.where(), root_ + "/sparse");
-    const std::string what = error.what();
-    EXPECT_NE(what.find("\"shot_0001.png\""), std::string::npos) << what;
-    EXPECT_NE(what.find("\"shot0001.jpg\""), std::string::npos) << what;
-    EXPECT_EQ(what.find("absent/"), std::string::npos) << what;
-  }
+  });
+  EXPECT_EQ(error.code(), ExitCode::kInput);
+  EXPECT_EQ(error.where(), root_ + "/sparse");
+  const std::string what = error.what();
+  EXPECT_NE(what.find("\"shot_0001.png\""), std::string::npos) << what;
+  EXPECT_NE(what.find("\"shot0001.jpg\""), std::string::npos) << what;
+  EXPECT_EQ(what.find("absent/"), std::string::npos) << what;
 }
 
 TEST(ListedPictures, FarNamesAreRefusedBeforeTheDiskIsAsked) {

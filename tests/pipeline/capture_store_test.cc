@@ -17,23 +17,20 @@ namespace regrade {
 namespace {
 
 using testing::ExitCodeOf;
+using testing::PoseCode;
 using testing::TemporaryFolder;
 
 TEST(CaptureStore, AnOutputFolderIsACaptureWithItsPoses) {
   const TemporaryFolder folder;
   testing::WriteCapture(folder / "s", 6, "96x72");
-  ASSERT_EQ(
-      ExitCodeOf({"pose", folder / "s/truth", "--out", folder / "first", "--tracks", "given"}),
-      0);
+  ASSERT_EQ(PoseCode(folder / "s/truth", folder / "first"), 0);
   EXPECT_EQ(DetectCapture(folder / "s/truth").kind, CaptureKind::kTransforms);
   for (const char* name : {"first", "first/poses"}) {
     const CaptureSource source = DetectCapture(folder / name);
     EXPECT_EQ(source.kind, CaptureKind::kPosed) << name;
     EXPECT_EQ(std::filesystem::path(source.photos).filename(), "photos");
   }
-  ASSERT_EQ(
-      ExitCodeOf({"pose", folder / "first", "--out", folder / "second", "--tracks", "given"}),
-      0);
+  ASSERT_EQ(PoseCode(folder / "first", folder / "second"), 0);
   const Capture before = ReadCapture(folder / "first/poses"),
                 after = ReadCapture(folder / "second/poses");
   ASSERT_EQ(after.views.size(), 6u);
@@ -50,30 +47,20 @@ TEST(CaptureStore, AnOutputFolderIsACaptureWithItsPoses) {
 TEST(CaptureStore, ANearestDepthThatChangedIsAnotherCapture) {
   const TemporaryFolder folder;
   testing::WriteCapture(folder / "s", 6, "96x72");
-  ASSERT_EQ(
-      ExitCodeOf({"pose", folder / "s/truth", "--out", folder / "first", "--tracks", "given"}),
-      0);
-  ASSERT_EQ(
-      ExitCodeOf({"pose", folder / "first", "--out", folder / "second", "--tracks", "given"}),
-      0);
-  ASSERT_EQ(
-      ExitCodeOf({"pose", folder / "first", "--out", folder / "second", "--tracks", "given"}),
-      0);
+  ASSERT_EQ(PoseCode(folder / "s/truth", folder / "first"), 0);
+  ASSERT_EQ(PoseCode(folder / "first", folder / "second"), 0);
+  ASSERT_EQ(PoseCode(folder / "first", folder / "second"), 0);
   const std::string index = folder / "first/poses/photos.json";
   JsonValue json = ReadJsonFile(index);
   json["nearest_depth"] = 0.5;
   WriteJsonFile(index, json);
-  EXPECT_EQ(
-      ExitCodeOf({"pose", folder / "first", "--out", folder / "second", "--tracks", "given"}),
-      3);
+  EXPECT_EQ(PoseCode(folder / "first", folder / "second"), 3);
 }
 
 TEST(CaptureStore, AFolderOfAnotherSchemaIsRefused) {
   const TemporaryFolder folder;
   testing::WriteCapture(folder / "s", 6, "96x72");
-  ASSERT_EQ(
-      ExitCodeOf({"pose", folder / "s/truth", "--out", folder / "first", "--tracks", "given"}),
-      0);
+  ASSERT_EQ(PoseCode(folder / "s/truth", folder / "first"), 0);
   const std::string index = folder / "first/poses/photos.json";
   JsonValue json = ReadJsonFile(index);
   json["schema"] = 1;
@@ -118,14 +105,11 @@ TEST(CaptureStore, PosesWithoutTracksCannotBeRefined) {
 TEST(CaptureStore, F61_PosesOfMissingPicturesAreUnused) {
   const TemporaryFolder folder;
   testing::WriteCapture(folder / "s", 6, "96x72");
-  ASSERT_EQ(
-      ExitCodeOf({"pose", folder / "s/truth", "--out", folder / "all", "--tracks", "given"}),
-      0);
+  ASSERT_EQ(PoseCode(folder / "s/truth", folder / "all"), 0);
   ASSERT_EQ(ExitCodeOf({"export", folder / "all", "--out", folder / "w"}), 0);
   for (const char* name : {"00000.png", "00003.png"})
     std::filesystem::remove(folder / (std::string("w/images/") + name));
-  ASSERT_EQ(ExitCodeOf({"pose", folder / "w", "--out", folder / "some", "--tracks", "given"}),
-            0);
+  ASSERT_EQ(PoseCode(folder / "w", folder / "some"), 0);
   const Capture all = ReadCapture(folder / "all/poses"),
                 some = ReadCapture(folder / "some/poses");
   ASSERT_EQ(some.views.size(), 4u);
@@ -139,8 +123,7 @@ TEST(CaptureStore, F61_PosesOfMissingPicturesAreUnused) {
   EXPECT_EQ(some.statuses[4].file, "00000.png");
   EXPECT_EQ(some.statuses[4].status, PhotoState::kSkipped);
   // And so as a capture of its own.
-  EXPECT_EQ(
-      ExitCodeOf({"pose", folder / "some", "--out", folder / "again", "--tracks", "given"}), 0);
+  EXPECT_EQ(PoseCode(folder / "some", folder / "again"), 0);
   EXPECT_EQ(ReadCapture(folder / "again/poses").views.size(), 4u);
 }
 
@@ -193,9 +176,7 @@ TEST(CaptureStore, MissingPicturesOfATransformsFileAreReported) {
   const TemporaryFolder folder;
   testing::WriteCapture(folder / "s", 6, "96x72");
   std::filesystem::remove(folder / "s/images/00002.png");
-  ASSERT_EQ(
-      ExitCodeOf({"pose", folder / "s/truth", "--out", folder / "out", "--tracks", "given"}),
-      0);
+  ASSERT_EQ(PoseCode(folder / "s/truth", folder / "out"), 0);
   const Capture capture = ReadCapture(folder / "out/poses");
   EXPECT_EQ(capture.views.size(), 5u);
   ASSERT_EQ(capture.statuses.size(), 6u);

@@ -13,6 +13,7 @@
 #include "reconstruct/colmap/listed_pairs.h"
 #include "tests/pipeline/clip_file.h"
 #include "tests/pipeline/picture_corpus.h"
+#include "tests/support/expect_error.h"
 
 namespace regrade {
 namespace {
@@ -20,7 +21,7 @@ namespace {
 using testing::ClipSpec;
 using testing::Contains;
 using testing::Photo;
-using testing::ScratchFolder;
+using testing::TemporaryFolder;
 using testing::WriteClip;
 
 ClipSurvey Survey(const std::vector<FrameMeasure>& frames, const std::string& file = "a.mp4") {
@@ -130,7 +131,7 @@ class ClipFrames : public ::testing::Test {
   }
 
   Image scene_;
-  ScratchFolder scratch_;
+  TemporaryFolder scratch_;
 };
 
 TEST_F(ClipFrames, TravelIsMeasuredInSteps) {
@@ -184,8 +185,7 @@ TEST_F(ClipFrames, F90_FramesAreStagedLikePhotos) {
     EXPECT_EQ(IngestPhotos(scratch_ / source, scratch_ / "out", {}, {}).fingerprint,
               result.fingerprint);
   }
-  IngestOptions few;
-  few.video_frames = 12;
+  IngestOptions few{.video_frames = 12};
   EXPECT_EQ(IngestPhotos(scratch_ / "in", scratch_ / "out", few, {}).photos.size(), 12u);
   few.take_clips = false;
   EXPECT_THROW(IngestPhotos(scratch_ / "in", scratch_ / "out", few, {}), Error);
@@ -193,24 +193,19 @@ TEST_F(ClipFrames, F90_FramesAreStagedLikePhotos) {
 
 TEST_F(ClipFrames, F90_ADamagedFilmIsNamedAndTheRestIsTaken) {
   for (int i = 0; i < 3; ++i)
-    testing::WriteBytes(scratch_ / "in/p" + std::to_string(i) + ".jpg",
-                        EncodeJpeg(Photo(96, 64, static_cast<uint64_t>(i)), 90));
+    testing::WriteText(scratch_ / "in/p" + std::to_string(i) + ".jpg",
+                       EncodeJpeg(Photo(96, 64, static_cast<uint64_t>(i)), 90));
   WriteClip(scratch_ / "whole.mp4", {Window(0), Window(50), Window(100)});
-  const std::string film = testing::ReadBytes(scratch_ / "whole.mp4");
-  testing::WriteBytes(scratch_ / "in/cut.mp4", film.substr(0, film.size() / 2));
+  const std::string film = testing::ReadText(scratch_ / "whole.mp4");
+  testing::WriteText(scratch_ / "in/cut.mp4", film.substr(0, film.size() / 2));
   const IngestResult result = IngestPhotos(scratch_ / "in", scratch_ / "out", {}, {});
   EXPECT_EQ(result.photos.size(), 3u);
   EXPECT_EQ(result.statuses[0].file, "cut.mp4");
   EXPECT_TRUE(Contains(result.statuses[0].why, "cannot read this film"))
       << result.statuses[0].why;
-  try {
-    IngestPhotos(scratch_ / "in/cut.mp4", scratch_ / "out", {}, {});
-    FAIL();
-  } catch (const Error& error) {
-    EXPECT_EQ(error.code(), ExitCode::kInput);
-    EXPECT_EQ(error.where(), scratch_ / "in/cut.mp4");
-    EXPECT_TRUE(Contains(error.what_failed(), "cannot read this film")) << error.what();
-  }
+  EXPECT_REGRADE_ERROR(IngestPhotos(scratch_ / "in/cut.mp4", scratch_ / "out", {}, {}),
+                       ExitCode::kInput, (scratch_ / "in/cut.mp4") + ": ",
+                       "cannot read this film");
 }
 
 std::vector<StagedPhoto> Staged(int photos, int frames) {

@@ -17,7 +17,7 @@ namespace regrade {
 namespace {
 
 namespace fs = std::filesystem;
-using testing::MaxDifference;
+using testing::LargestDifference;
 using testing::MeanDifference;
 using testing::Primaries;
 
@@ -27,11 +27,6 @@ constexpr char kFirstPhoto[] = "/images/00000.png";
 class ColorCopies : public testing::PictureTest {
  protected:
   void SetUp() override { testing::WriteCapture(scratch_ / "srgb", 16, "128x96"); }
-  static int Regrade(const std::vector<std::string>& arguments) {
-    const testing::ProgramOutcome done = testing::RunProgram(REGRADE_PROGRAM, arguments);
-    if (done.code != 0) std::printf("%s\n", done.text.c_str());
-    return done.code;
-  }
   // Photos as 16-bit TIFF files, or 8-bit PNG files, of other primaries.
   void Copy(const std::string& name, const Primaries& primaries, double gamma,
             const std::string& icc, bool tiff) {
@@ -50,30 +45,11 @@ class ColorCopies : public testing::PictureTest {
   };
   Seen Reconstruct(const std::string& name, const std::string& seed = "0") {
     const std::string out = scratch_ / name + "_out" + seed;
-    EXPECT_EQ(Regrade({"reconstruct",
-                       scratch_ / name + "/truth",
-                       "--out",
-                       out,
-                       "--seed",
-                       seed,
-                       "--photo-size",
-                       "96",
-                       "--field",
-                       "voxels",
-                       "--fit-resolutions",
-                       "32",
-                       "--fit-steps",
-                       "300",
-                       "--threads",
-                       "2",
-                       "--tracks",
-                       "given",
-                       "--holdout",
-                       "0",
-                       "--effects",
-                       "exposure=off,view-dependence=off",
-                       "--reproducible"}),
-              0);
+    testing::Said(testing::Joined(
+        {"reconstruct", scratch_ / name + "/truth", "--out", out, "--seed", seed},
+        testing::Words("--photo-size 96 --field voxels --fit-resolutions 32 --fit-steps 300 "
+                       "--threads 2 --tracks given --holdout 0 --reproducible --effects "
+                       "exposure=off,view-dependence=off")));
     const StoredField stored = ReadFieldFile(out + "/field.npz");
     const WorkingViews views = ReadWorkingViews(out + "/poses", 96, 0).InField(stored);
     Image renders(96, 0, 3);
@@ -114,7 +90,7 @@ TEST_F(ColorCopies, H145_TheFieldHasTheColoursOfTheSrgbCapture) {
     Copy(copy.name, copy.primaries, copy.gamma,
          testing::IccProfile(copy.primaries, copy.gamma, copy.name), copy.tiff);
     const Seen seen = Reconstruct(copy.name);
-    const double photos = MaxDifference(seen.staged, srgb.staged);
+    const double photos = LargestDifference(seen.staged, srgb.staged);
     EXPECT_LT(photos, testing::RecordBound(std::string("photos, ") + copy.name,
                                            testing::Computed::kFloat, photos, copy.photos));
     const double shift = ColorShift(seen.render, srgb.render);
@@ -135,11 +111,11 @@ TEST_F(ColorCopies, H142_SixteenBitsGoToTheFieldAndBack) {
        true);
   const Seen seen = Reconstruct("p3");
   EXPECT_EQ(DecodePhoto(scratch_ / "p3_out0/poses/photos/00000.png").bits, 16);
-  EXPECT_LT(MaxDifference(seen.staged, photo), 1.0 / 255);
+  EXPECT_LT(LargestDifference(seen.staged, photo), 1.0 / 255);
   WritePng16(scratch_ / "still.png", seen.render);
   const DecodedPhoto still = DecodePhoto(scratch_ / "still.png");
   EXPECT_EQ(still.bits, 16);
-  EXPECT_LT(MaxDifference(still.image, seen.render), 0.51 / 65535);
+  EXPECT_LT(LargestDifference(still.image, seen.render), 0.51 / 65535);
 }
 
 }  // namespace

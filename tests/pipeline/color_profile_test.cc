@@ -21,7 +21,7 @@ using testing::IccProfile;
 using testing::kAdobePrimaries;
 using testing::kP3Primaries;
 using testing::kSrgbPrimaries;
-using testing::MaxDifference;
+using testing::LargestDifference;
 using testing::MeanDifference;
 using testing::Photo;
 using testing::Primaries;
@@ -55,10 +55,10 @@ TEST_F(ColorProfile, H145_P3AndAdobeRgbCopiesAreTheSamePicture) {
                          {"adobe_8.tif", kAdobePrimaries, 563 / 256.0, Adobe(), k8, 6.0 / 255}};
   for (const Copy& copy : copies) {
     const Image encoded = EncodedIn(copy.primaries, copy.gamma, srgb);
-    EXPECT_GT(MaxDifference(encoded, srgb), 0.02) << "the profile matters";
+    EXPECT_GT(LargestDifference(encoded, srgb), 0.02) << "the profile matters";
     WriteWithProfile(scratch_ / copy.file, encoded, copy.icc, copy.type);
     const DecodedPhoto photo = DecodePhoto(scratch_ / copy.file);
-    const double worst = MaxDifference(photo.image, srgb);
+    const double worst = LargestDifference(photo.image, srgb);
     EXPECT_LT(worst, testing::RecordBound(std::string("colours of ") + copy.file,
                                           testing::Computed::kFloat, worst, copy.tolerance));
     EXPECT_LT(MeanDifference(photo.image, srgb), 0.5 / 255);
@@ -148,7 +148,7 @@ TEST_F(ColorProfile, GreyAndTransparentPicturesKeepTheirForm) {
   WriteWithProfile(scratch_ / "x.tif", Photo(96, 64, 1), icc, k8);
   const DecodedPhoto other = DecodePhoto(scratch_ / "x.tif");
   EXPECT_TRUE(Contains(other.notice, "does not fit the picture")) << other.notice;
-  EXPECT_LT(MaxDifference(other.image, Photo(96, 64, 1)), 1e-6);
+  EXPECT_LT(LargestDifference(other.image, Photo(96, 64, 1)), 1e-6);
 }
 
 TEST_F(ColorProfile, H145_AdobeRgbOfACameraHasAMarkOnly) {
@@ -160,15 +160,15 @@ TEST_F(ColorProfile, H145_AdobeRgbOfACameraHasAMarkOnly) {
                            TiffEntry(0xa005, 4, 1, 44) + Little(0, 4) + Little(1, 2) +
                            Little(1, 2) + Little(2, 2) + Little(4, 4) +
                            std::string("R03\0", 4) + Little(0, 4);
-  const std::string jpeg = testing::ReadBytes(scratch_ / "a.jpg");
+  const std::string jpeg = testing::ReadText(scratch_ / "a.jpg");
   EXPECT_EQ(DecodePhoto(scratch_ / "a.jpg").colors, "");
   const DecodedPhoto photo = DecodePhoto(Put("b.jpg", testing::WithSegment(jpeg, 0xe1, exif)));
   EXPECT_NE(photo.colors, "");
   // As with the profile itself.
   const std::string body = std::string("ICC_PROFILE\0\1\1", 14) + Adobe();
   const Image named = DecodePhoto(Put("c.jpg", testing::WithSegment(jpeg, 0xe2, body))).image;
-  EXPECT_LT(MaxDifference(photo.image, named), 1e-3);
-  EXPECT_GT(MaxDifference(DecodePhoto(scratch_ / "a.jpg").image, named), 0.03);
+  EXPECT_LT(LargestDifference(photo.image, named), 1e-3);
+  EXPECT_GT(LargestDifference(DecodePhoto(scratch_ / "a.jpg").image, named), 0.03);
 }
 
 TEST_F(ColorProfile, H143_OpenExrOfOtherPrimariesBecomesSrgb) {
@@ -183,7 +183,7 @@ TEST_F(ColorProfile, H143_OpenExrOfOtherPrimariesBecomesSrgb) {
   ASSERT_TRUE(output->write_image(OIIO::TypeDesc::FLOAT, light.pixels.data()));
   ASSERT_TRUE(output->close());
   const DecodedPhoto photo = DecodePhoto(scratch_ / "a.exr");
-  EXPECT_LT(MaxDifference(photo.image, srgb), 1e-3);
+  EXPECT_LT(LargestDifference(photo.image, srgb), 1e-3);
   EXPECT_TRUE(Contains(photo.colors, "linear light")) << photo.colors;
 }
 
@@ -223,10 +223,10 @@ TEST_F(ColorProfile, F91_AHeicOfAPhoneKeepsItsColours) {
   EXPECT_EQ(photo.bits, 8);
   // Without loss but for the way to YCbCr in 8 bits and back: two steps, which dark values
   // beside light ones take as several (as above).
-  EXPECT_LT(MaxDifference(photo.image, srgb), 12.0 / 255);
-  EXPECT_GT(MaxDifference(encoded, srgb), 20.0 / 255);
+  EXPECT_LT(LargestDifference(photo.image, srgb), 12.0 / 255);
+  EXPECT_GT(LargestDifference(encoded, srgb), 20.0 / 255);
   // A half of it is refused by name.
-  const std::string bytes = testing::ReadBytes(scratch_ / "IMG_1.HEIC");
+  const std::string bytes = testing::ReadText(scratch_ / "IMG_1.HEIC");
   EXPECT_NE(testing::Refusal(Put("half.heic", bytes.substr(0, bytes.size() / 2))), "");
 }
 

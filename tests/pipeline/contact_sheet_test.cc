@@ -6,20 +6,16 @@
 #include <algorithm>
 
 #include "pipeline/images/draw_text.h"
+#include "tests/support/pictures.h"
 
 namespace regrade {
 namespace {
 
-Image Plain(int width, int height, float value) {
-  Image image(width, height);
-  std::fill(image.pixels.begin(), image.pixels.end(), value);
-  return image;
-}
-
 TEST(ContactSheet, EveryPictureIsThereWhole) {
   const Image sheet =
-      MakeContactSheet({{{Plain(40, 30, 0.25f), "28.1 dB"}, {Plain(30, 30, 0.5f), ""}},
-                        {{Plain(40, 20, 0.75f), "x"}, {Image(), "nothing"}}});
+      MakeContactSheet({{{testing::ConstantImage(40, 30, 0.25f), "28.1 dB"},
+                         {testing::ConstantImage(30, 30, 0.5f), ""}},
+                        {{testing::ConstantImage(40, 20, 0.75f), "x"}, {Image(), "nothing"}}});
   int quarter = 0, half = 0, three = 0, ink = 0;
   for (int64_t i = 0; i < sheet.num_pixels(); ++i) {
     const float v = sheet.pixels[static_cast<size_t>(3 * i)];
@@ -35,7 +31,7 @@ TEST(ContactSheet, EveryPictureIsThereWhole) {
 }
 
 TEST(PictureText, StaysWithinItsWidthAndThePicture) {
-  Image image = Plain(60, 30, 1);
+  Image image = testing::ConstantImage(60, 30, 1);
   DrawText(&image, 10, 4, 20, "WWWWWWWWWWWW", 1, 0);
   int left = 0, inside = 0, right = 0;
   for (int y = 0; y < 30; ++y)
@@ -53,7 +49,7 @@ TEST(PictureText, StaysWithinItsWidthAndThePicture) {
 // The end of a line that is too long, for example a title over narrow columns.
 TEST(PictureText, ALineThatIsTooLongIsDrawnSmaller) {
   const auto ink_at = [](const std::string& text) {
-    Image image = Plain(120, 30, 1);
+    Image image = testing::ConstantImage(120, 30, 1);
     DrawText(&image, 0, 0, 100, text, 1, 0);
     int ink = 0;
     for (int y = 0; y < 30; ++y)

@@ -5,6 +5,7 @@
 #include "pipeline/images/image_file.h"
 #include "tests/pipeline/libjpeg_file.h"
 #include "tests/pipeline/picture_corpus.h"
+#include "tests/support/expect_error.h"
 
 namespace regrade {
 namespace {
@@ -14,7 +15,7 @@ using testing::ExifBlock;
 using testing::FloatTiff;
 using testing::LibjpegFile;
 using testing::Photo;
-using testing::ReadBytes;
+using testing::ReadText;
 using testing::Refusal;
 using testing::WithSegment;
 
@@ -46,7 +47,7 @@ TEST_F(DamagedImage, F3_FlippedBytesNeverCrash) {
   const std::string jpeg =
       WithSegment(EncodeJpeg(Photo(80, 64, 3), 70), 0xe1, ExifBlock(6, 28));
   WritePng8(scratch_ / "a.png", Photo(64, 64, 4));
-  const std::string png = ReadBytes(scratch_ / "a.png"), tiff = FloatTiff(Photo(64, 64, 4));
+  const std::string png = ReadText(scratch_ / "a.png"), tiff = FloatTiff(Photo(64, 64, 4));
   int refused = 0, mutants = 0;
   for (const std::string& original : {jpeg, png, tiff})
     for (int i = 0; i < 400; ++i, ++mutants) {
@@ -62,7 +63,7 @@ TEST_F(DamagedImage, F3_FlippedBytesNeverCrash) {
 
 TEST_F(DamagedImage, F4_PngDamageIsNamed) {
   WritePng8(scratch_ / "a.png", Photo(80, 70, 3));
-  const std::string whole = ReadBytes(scratch_ / "a.png");
+  const std::string whole = ReadText(scratch_ / "a.png");
   std::string flipped = whole;
   flipped[whole.size() / 2] ^= 1;
   EXPECT_TRUE(Contains(Refusal(Put("b.png", flipped)), "cannot read this PNG: "));
@@ -132,20 +133,16 @@ TEST_F(DamagedImage, F10_MissingAndBrokenLinks) {
 }
 
 TEST_F(DamagedImage, F16_ABadStylePictureIsReported) {
-  const auto refusal = [](const std::string& path) -> std::string {
-    try {
-      ReadStylePicture(path, nullptr);
-      return "";
-    } catch (const Error& error) {
-      EXPECT_EQ(error.code(), ExitCode::kInput);
-      return error.what_failed();
-    }
+  const auto refusal = [](const std::string& path) {
+    const Error error = testing::ErrorFrom([&] { ReadStylePicture(path, nullptr); });
+    EXPECT_EQ(error.code(), ExitCode::kInput);
+    return error.what_failed();
   };
   EXPECT_TRUE(Contains(refusal(scratch_ / "none.png"), "No such file"));
   EXPECT_TRUE(Contains(refusal(scratch_.path()), "a folder"));
   const std::string jpeg = EncodeJpeg(Photo(64, 64, 1), 80);
   EXPECT_TRUE(Contains(refusal(Put("cut.jpg", jpeg.substr(0, jpeg.size() / 2))), "damaged"));
-  EXPECT_EQ(refusal(Put("tiny.png", EncodePng8(Photo(3, 1, 1, 1)))), "");
+  ReadStylePicture(Put("tiny.png", EncodePng8(Photo(3, 1, 1, 1))), nullptr);
 }
 
 TEST_F(DamagedImage, F16_TransparentStyleIsLaidOverWhite) {

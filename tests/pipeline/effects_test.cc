@@ -8,12 +8,12 @@
 #include "kernels/field/cpu/rays.h"
 #include "kernels/field/cpu/render_view.h"
 #include "kernels/field/render.h"
-#include "kernels/process/child_process.h"
 #include "pipeline/fields/field_file.h"
 #include "pipeline/files/json_file.h"
 #include "pipeline/workspace/output_names.h"
 #include "reconstruct/colmap/colmap_model.h"
 #include "tests/support/nightly.h"
+#include "tests/support/run_program.h"
 #include "tests/support/synthetic_photos.h"
 #include "tests/support/temporary_folder.h"
 
@@ -45,16 +45,10 @@ const std::vector<std::string> kSplats = {"--splat-steps", "400", "--splats", "4
 Reconstruction Reconstruct(const std::string& capture, const std::string& out,
                            const std::vector<std::string>& size,
                            const std::vector<std::string>& more = {}) {
-  ChildOptions options;
-  options.argv = {REGRADE_PROGRAM, "reconstruct", capture, "--out", out, "--reproducible"};
-  options.argv.insert(options.argv.end(), size.begin(), size.end());
-  options.argv.insert(options.argv.end(), more.begin(), more.end());
-  options.wall_limit_s = 300;
-  std::string text;
-  const ChildResult result =
-      RunChild(options, [&text](const std::string& line) { text += line + "\n"; });
-  if (result.end != ChildEnd::kExited || result.exit_status != 0)
-    throw std::runtime_error(text);
+  std::vector<std::string> words{"reconstruct", capture, "--out", out, "--reproducible"};
+  words.insert(words.end(), size.begin(), size.end());
+  words.insert(words.end(), more.begin(), more.end());
+  testing::Said(words);
   return {ReadFieldFile(out + "/field.npz"),
           ReadJsonFile(out + "/.regrade/stages/reconstruct.json").At("metrics")};
 }
@@ -122,11 +116,8 @@ TEST(EffectsOff, H155_ResultsAreThoseWithoutThem) {
 // Poses 0.3 degrees and 0.5 % of the spread off, tracks exact to half a pixel.
 TEST(EffectsOn, RefinedPosesGainDecibels) {
   TemporaryFolder folder;
-  ChildOptions synth;
-  synth.argv = {REGRADE_PROGRAM, "synth",   folder / "capture", "--views", "16",
-                "--size",        "240x180", "--effects",        "poses"};
-  synth.wall_limit_s = 120;
-  ASSERT_EQ(RunChild(synth, [](const std::string&) {}).exit_status, 0);
+  testing::Said({"synth", folder / "capture", "--views", "16", "--size", "240x180", "--effects",
+                 "poses"});
   const std::string others = "exposure=off,view-dependence=on";
   const Reconstruction on =
       Reconstruct(folder / "capture", folder / "on", kSplats, {"--effects", others});

@@ -23,10 +23,10 @@ TEST(EvaluateCommand, WritesMetricsIntervalsAndHeatMaps) {
   WriteFrames(folder / "source", 6);
   WriteFrames(folder / "styled", 6, 0.03f);
   WriteText(folder / "out/heatmaps/styled_gap1_99999.png", "of an earlier evaluation");
-  const Outcome outcome = Evaluate({"--frames", folder / "styled", "--reference",
-                                    folder / "source", "--out", folder / "out"});
+  const ProgramOutcome outcome = Evaluate({"--frames", folder / "styled", "--reference",
+                                           folder / "source", "--out", folder / "out"});
   ASSERT_EQ(outcome.code, 0) << outcome.text;
-  EXPECT_OUTPUT(outcome, "95 %");
+  EXPECT_SAYS(outcome, "95 %");
   const JsonValue json = ReadJsonFile(folder / "out/report.json");
   int maps = 0;
   for (const JsonValue& row : json.At("consistency").AsArray()) {
@@ -61,12 +61,12 @@ TEST(EvaluateCommand, RequiredMetrics) {
     return Evaluate({"--frames", folder / "styled", "--reference", folder / "source", "--out",
                      folder / "out", "--require", require});
   };
-  Outcome outcome = outcome_of("styled:beauty>=1");
+  ProgramOutcome outcome = outcome_of("styled:beauty>=1");
   EXPECT_EQ(outcome.code, 2);
   EXPECT_FALSE(std::filesystem::exists(folder / "out"));
   outcome = outcome_of("styled:tc-psnr:1>=90");
   EXPECT_EQ(outcome.code, 8);
-  EXPECT_OUTPUT(outcome, "styled:tc-psnr:1>=90: measured");
+  EXPECT_SAYS(outcome, "styled:tc-psnr:1>=90: measured");
   EXPECT_TRUE(std::filesystem::exists(folder / "out/report.json"));
   EXPECT_EQ(outcome_of("styled:tc-psnr:1<=90,source:tc-psnr:1>=20").code, 0);
 }
@@ -80,24 +80,24 @@ TEST(EvaluateCommand, UnusableFramesAreNamed) {
                      folder / "out"});
   };
   std::filesystem::remove(folder / "styled/00002.png");
-  Outcome outcome = outcome_of();
+  ProgramOutcome outcome = outcome_of();
   EXPECT_EQ(outcome.code, 3);
-  EXPECT_OUTPUT(outcome, "frame 00002 is missing between 00001.png and 00003.png");
+  EXPECT_SAYS(outcome, "frame 00002 is missing between 00001.png and 00003.png");
   WriteText(folder / "styled/00002.png", EncodePng8(Frame(2)).substr(0, 900));
   outcome = outcome_of();
   EXPECT_EQ(outcome.code, 3);
-  EXPECT_OUTPUT(outcome, "styled/00002.png");
+  EXPECT_SAYS(outcome, "styled/00002.png");
   WriteText(folder / "styled/00002.png", EncodePng8(Image(64, 40, 3)));
   outcome = outcome_of();
   EXPECT_EQ(outcome.code, 3);
-  EXPECT_OUTPUT(outcome, "this frame is 64 x 40 px, 00000.png is 64 x 48 px");
+  EXPECT_SAYS(outcome, "this frame is 64 x 40 px, 00000.png is 64 x 48 px");
   for (const char* name : {"00000.png", "00001.png", "00002.png", "00003.png"})
     std::filesystem::remove(folder / (std::string("styled/") + name));
   WriteText(folder / "styled/left.png", EncodePng8(Frame(0)));
   WriteText(folder / "styled/right.png", EncodePng8(Frame(1)));
   outcome = outcome_of();
   EXPECT_EQ(outcome.code, 3);
-  EXPECT_OUTPUT(outcome, "2 frames, the reference has 4");
+  EXPECT_SAYS(outcome, "2 frames, the reference has 4");
   EXPECT_FALSE(std::filesystem::exists(folder / "out"));  // the error precedes all work
 }
 
@@ -115,10 +115,10 @@ TEST(EvaluateCommand, NetworksOfTheUser) {
                              "--target", folder / "source", "--out", folder / "e"});
     return Evaluate(more);
   };
-  const Outcome done =
+  const ProgramOutcome done =
       evaluate({"--lpips", folder / "distance.onnx", "--flow", "onnx:" + folder / "flow.onnx"});
   ASSERT_EQ(done.code, 0) << done.text;
-  EXPECT_OUTPUT(done, "LPIPS to 2D");
+  EXPECT_SAYS(done, "LPIPS to 2D");
   const JsonValue report = ReadJsonFile(folder / "e/report.json");
   for (const JsonValue& row : report.At("fidelity").AsArray()) {
     const double lpips = row.At("lpips_to_2d").AsDouble();
@@ -127,9 +127,10 @@ TEST(EvaluateCommand, NetworksOfTheUser) {
   EXPECT_NE(testing::ReadText(folder / "e/report.html").find("LPIPS"), std::string::npos);
   for (const char* option : {"--lpips", "--flow"}) {
     const bool flow = std::string(option) == "--flow";
-    const Outcome refused = evaluate({option, (flow ? "onnx:" : "") + (folder / "diary.onnx")});
+    const ProgramOutcome refused =
+        evaluate({option, (flow ? "onnx:" : "") + (folder / "diary.onnx")});
     EXPECT_EQ(refused.code, 4) << refused.text;
-    EXPECT_OUTPUT(refused, "diary.onnx");
+    EXPECT_SAYS(refused, "diary.onnx");
   }
 }
 
@@ -144,7 +145,7 @@ TEST(EvaluateCommand, ControlsAreRows) {
   const auto evaluate = [&](std::vector<std::string> more) {
     more.insert(more.end(), {"--frames", folder / "styled", "--gaps", "1", "--controls",
                              "--out", folder / "out"});
-    const Outcome done = Evaluate(more);
+    const ProgramOutcome done = Evaluate(more);
     EXPECT_EQ(done.code, 0) << done.text;
     std::string names;
     const JsonValue report = ReadJsonFile(folder / "out/report.json");
@@ -162,10 +163,11 @@ TEST(EvaluateCommand, ControlsAreRows) {
 TEST(EvaluateCommand, H121_OneFrameIsNoPair) {
   const TemporaryFolder folder;
   WriteFrames(folder / "styled", 1);
-  const Outcome outcome = Evaluate({"--frames", folder / "styled", "--out", folder / "out"});
+  const ProgramOutcome outcome =
+      Evaluate({"--frames", folder / "styled", "--out", folder / "out"});
   EXPECT_EQ(outcome.code, 0);
-  EXPECT_OUTPUT(outcome, "one frame only");
-  EXPECT_OUTPUT(outcome, "no pair of frames is 1 apart");
+  EXPECT_SAYS(outcome, "one frame only");
+  EXPECT_SAYS(outcome, "no pair of frames is 1 apart");
   const JsonValue json = ReadJsonFile(folder / "out/report.json");
   EXPECT_TRUE(json.At("consistency").AsArray()[0].At("tc_psnr_mean_db").IsNull());
   EXPECT_TRUE(json.At("consistency_pairs").AsArray().empty());
@@ -176,15 +178,14 @@ TEST(EvaluateCommand, AProtocolSetsModeAndGaps) {
   WriteFrames(folder / "source", 6);
   WriteFrames(folder / "styled", 6, 0.03f);
   const auto evaluate = [&](const std::vector<std::string>& more, const std::string& out) {
-    std::vector<std::string> words{"--frames",        folder / "styled", "--reference",
-                                   folder / "source", "--out",           folder / out};
-    words.insert(words.end(), more.begin(), more.end());
-    return Evaluate(words);
+    return Evaluate(testing::Joined({"--frames", folder / "styled", "--reference",
+                                     folder / "source", "--out", folder / out},
+                                    more));
   };
-  const Outcome named = evaluate({"--protocol", "liprf"}, "named");
+  const ProgramOutcome named = evaluate({"--protocol", "liprf"}, "named");
   ASSERT_EQ(named.code, 0) << named.text;
-  EXPECT_OUTPUT(named, "mode ruder2016");
-  const Outcome spelled =
+  EXPECT_SAYS(named, "mode ruder2016");
+  const ProgramOutcome spelled =
       evaluate({"--mode", "ruder2016", "--gaps", "1,5", "--warp", "earlier"}, "spelled");
   ASSERT_EQ(spelled.code, 0) << spelled.text;
   const auto report_of = [&](const std::string& out) {
@@ -193,12 +194,12 @@ TEST(EvaluateCommand, AProtocolSetsModeAndGaps) {
     return DumpJson(json);
   };
   EXPECT_EQ(report_of("named"), report_of("spelled"));
-  const Outcome refused = evaluate({"--protocol", "liprf", "--gaps", "1,7"}, "refused");
+  const ProgramOutcome refused = evaluate({"--protocol", "liprf", "--gaps", "1,7"}, "refused");
   EXPECT_EQ(refused.code, 2);
-  EXPECT_OUTPUT(refused, "leave out --gaps");
-  const Outcome fitted = evaluate({"--control-field"}, "refused");  // of what photos?
+  EXPECT_SAYS(refused, "leave out --gaps");
+  const ProgramOutcome fitted = evaluate({"--control-field"}, "refused");  // of what photos?
   EXPECT_EQ(fitted.code, 2);
-  EXPECT_OUTPUT(fitted, "for runs of regrade only");
+  EXPECT_SAYS(fitted, "for runs of regrade only");
   EXPECT_FALSE(std::filesystem::exists(folder / "refused"));
 }
 
@@ -272,11 +273,11 @@ TEST(EvaluateCommand, OddInputsHaveTheirSentences) {
           "1",        "--mode",          mode};
       if (!std::filesystem::is_empty(folder / "flow"))
         words.insert(words.end(), {"--flow", "files:" + (folder / "flow")});
-      const Outcome outcome = Evaluate(words);
+      const ProgramOutcome outcome = Evaluate(words);
       EXPECT_EQ(outcome.code, test.code) << outcome.text;
       const bool no_pair = std::string(test.sentence).starts_with("no pair");
       if (!no_pair || mode == std::string("lai2018")) {
-        EXPECT_OUTPUT(outcome, test.sentence);
+        EXPECT_SAYS(outcome, test.sentence);
       }
       std::string words_said = outcome.text;  // the folder's name is random
       while (words_said.find(folder.path()) != std::string::npos)
@@ -293,19 +294,19 @@ TEST(EvaluateCommand, UnusableFlowFilesAreNamed) {
     return Evaluate(
         {"--frames", folder / "styled", "--gaps", "1", "--flow", "files:" + (folder / "flow")});
   };
-  Outcome outcome = outcome_of();
+  ProgramOutcome outcome = outcome_of();
   EXPECT_EQ(outcome.code, 3);
-  EXPECT_OUTPUT(outcome, "there is no flow file from frame 0 to frame 1");
+  EXPECT_SAYS(outcome, "there is no flow file from frame 0 to frame 1");
   std::filesystem::create_directories(folder / "flow");
   WriteFlowFile(folder / "flow/00000_00001.flo", FlowField(64, 48));
   outcome = outcome_of();
   EXPECT_EQ(outcome.code, 3);
-  EXPECT_OUTPUT(outcome, "there is no flow file from frame 1 to frame 0");
-  EXPECT_OUTPUT(outcome, "00001_00000.flo");
+  EXPECT_SAYS(outcome, "there is no flow file from frame 1 to frame 0");
+  EXPECT_SAYS(outcome, "00001_00000.flo");
   WriteFlowFile(folder / "flow/00001_00000.flo", FlowField(32, 24));
   outcome = outcome_of();
   EXPECT_EQ(outcome.code, 3);
-  EXPECT_OUTPUT(outcome, "the flow is 32 x 24 px, the frames 64 x 48 px");
+  EXPECT_SAYS(outcome, "the flow is 32 x 24 px, the frames 64 x 48 px");
   WriteFlowFile(folder / "flow/00001_00000.flo", FlowField(64, 48));
   EXPECT_EQ(outcome_of().code, 0);
 }

@@ -8,20 +8,13 @@
 
 #include "evaluate/flow_file.h"
 #include "pipeline/files/json_file.h"
-#include "pipeline/synth/synth_capture.h"
 #include "tests/support/evaluated_frames.h"
+#include "tests/support/tiny_run.h"
 
 namespace regrade {
 namespace {
 
 using namespace regrade::testing;
-
-JsonValue Row(const JsonValue& report, const std::string& sequence, int gap = 1) {
-  for (const JsonValue& row : report.At("consistency").AsArray())
-    if (row.At("sequence").AsString() == sequence && row.At("gap").AsInt() == gap) return row;
-  ADD_FAILURE() << "no row of " << sequence << " at gap " << gap;
-  return {};
-}
 
 // The same frames under numbers that overlap: each is compared with its own moment.
 TEST(EvaluateFolders, FramesOfOtherMomentsArePairedByNumber) {
@@ -30,7 +23,7 @@ TEST(EvaluateFolders, FramesOfOtherMomentsArePairedByNumber) {
   for (int i = 1; i < 7; ++i)
     WriteText(folder / ("styled/take2_" + std::to_string(i) + ".png"), EncodePng8(Frame(i)));
   WriteFrames(folder / "target", 6);
-  const Outcome outcome =
+  const ProgramOutcome outcome =
       Evaluate({"--frames", folder / "styled", "--reference", folder / "source", "--target",
                 folder / "target", "--gaps", "1", "--out", folder / "out"});
   ASSERT_EQ(outcome.code, 0) << outcome.text;
@@ -39,11 +32,11 @@ TEST(EvaluateFolders, FramesOfOtherMomentsArePairedByNumber) {
   EXPECT_EQ(pairing.At("by").AsString(), "number");
   EXPECT_EQ(pairing.At("left_out").AsArray().at(0).AsString(), "take2_6.png");
   EXPECT_EQ(pairing.At("reference_left_out").AsArray().at(0).AsString(), "00000.png");
-  EXPECT_EQ(Row(report, "styled").At("pairs").AsInt(), 4);
+  EXPECT_EQ(RowOf(report, "styled").At("pairs").AsInt(), 4);
   for (const JsonValue& row : report.At("fidelity").AsArray())
     EXPECT_TRUE(row.At("psnr_to_2d_db_infinite").AsBool()) << DumpJson(row);
-  EXPECT_EQ(Row(report, "styled").At("tc_psnr_mean_db").AsDouble(),
-            Row(report, "source").At("tc_psnr_mean_db").AsDouble());
+  EXPECT_EQ(RowOf(report, "styled").At("tc_psnr_mean_db").AsDouble(),
+            RowOf(report, "source").At("tc_psnr_mean_db").AsDouble());
 }
 
 // Flow files are called by the numbers of the reference's frames or by their places in its
@@ -65,11 +58,11 @@ TEST(EvaluateFolders, FlowFilesBelongToTheirFrames) {
         WriteFlowFile(folder / (name + "/" + (back ? FlowFileName(b, a) : FlowFileName(a, b))),
                       flow);
       }
-    const Outcome outcome =
+    const ProgramOutcome outcome =
         Evaluate({"--frames", folder / "styled", "--reference", folder / "source", "--gaps",
                   "1", "--flow", "files:" + (folder / name), "--out", folder / "out"});
     EXPECT_EQ(outcome.code, 0) << outcome.text;
-    const JsonValue row = Row(ReadJsonFile(folder / "out/report.json"), "styled");
+    const JsonValue row = RowOf(ReadJsonFile(folder / "out/report.json"), "styled");
     EXPECT_EQ(row.At("undefined_pairs").AsInt(), 0);
     return row.At("coverage").AsDouble();
   };
@@ -86,20 +79,18 @@ TEST(EvaluateFolders, SeveralFoldersAreComparedPairByPair) {
   WriteFrames(folder / "a", 6, 0.01f);
   WriteFrames(folder / "b", 6, 0.03f);
   const auto evaluate = [&](const std::vector<std::string>& more) {
-    std::vector<std::string> words{"--frames",    folder / "a",      folder / "b",
-                                   "--reference", folder / "source", "--gaps",
-                                   "1",           "--out",           folder / "out"};
-    words.insert(words.end(), more.begin(), more.end());
-    return Evaluate(words);
+    return Evaluate(testing::Joined({"--frames", folder / "a", folder / "b", "--reference",
+                                     folder / "source", "--gaps", "1", "--out", folder / "out"},
+                                    more));
   };
-  const Outcome outcome = evaluate({"--label", "Ours", "Other & co", "--table", "latex",
-                                    "--require", "styled-2:tc-psnr:1<=90"});
+  const ProgramOutcome outcome = evaluate({"--label", "Ours", "Other & co", "--table", "latex",
+                                           "--require", "styled-2:tc-psnr:1<=90"});
   ASSERT_EQ(outcome.code, 0) << outcome.text;
-  EXPECT_OUTPUT(outcome, "minus Ours & 95 \\%");
-  EXPECT_OUTPUT(outcome, "\nOther \\& co & 1 & 5 & ");
+  EXPECT_SAYS(outcome, "minus Ours & 95 \\%");
+  EXPECT_SAYS(outcome, "\nOther \\& co & 1 & 5 & ");
   const JsonValue report = ReadJsonFile(folder / "out/report.json");
   EXPECT_EQ(report.At("labels").At("styled_2").AsString(), "Other & co");
-  const JsonValue ours = Row(report, "styled"), other = Row(report, "styled_2");
+  const JsonValue ours = RowOf(report, "styled"), other = RowOf(report, "styled_2");
   EXPECT_EQ(ours.Find("tc_psnr_difference_db"), nullptr);
   EXPECT_EQ(other.At("difference_pairs").AsInt(), 5);
   const double difference = other.At("tc_psnr_difference_db").AsDouble();
@@ -115,11 +106,11 @@ TEST(EvaluateFolders, SeveralFoldersAreComparedPairByPair) {
            {{"--label"}, "its value is missing"},
            {{"--require", "styled-3:tc-psnr:1>=1"}, "styled_3"},
            {{"--junit", folder / "j.xml"}, "add --require"}}) {
-    const Outcome refused = evaluate(more);
+    const ProgramOutcome refused = evaluate(more);
     EXPECT_EQ(refused.code, 2) << refused.text;
-    EXPECT_OUTPUT(refused, part);
+    EXPECT_SAYS(refused, part);
   }
-  const Outcome alone = Evaluate({"--frames", folder / "a", folder / "b"});
+  const ProgramOutcome alone = Evaluate({"--frames", folder / "a", folder / "b"});
   EXPECT_EQ(alone.code, 2) << alone.text;
 }
 
@@ -130,11 +121,11 @@ TEST(EvaluateFolders, RequirementsBecomeTestCases) {
     return Evaluate({"--frames", folder / "styled", "--gaps", "1", "--json", "--require",
                      require, "--junit", folder / "junit.xml"});
   };
-  const Outcome outcome = evaluate("styled:tc-psnr:1>=90,styled:pairs:1>=2");
+  const ProgramOutcome outcome = evaluate("styled:tc-psnr:1>=90,styled:pairs:1>=2");
   EXPECT_EQ(outcome.code, 8);
-  EXPECT_OUTPUT(outcome, "\"event\":\"requirement\"");
-  EXPECT_OUTPUT(outcome, "\"holds\":true");
-  EXPECT_OUTPUT(outcome, "\"holds\":false");
+  EXPECT_SAYS(outcome, "\"event\":\"requirement\"");
+  EXPECT_SAYS(outcome, "\"holds\":true");
+  EXPECT_SAYS(outcome, "\"holds\":false");
   const std::string xml = testing::ReadText(folder / "junit.xml");
   EXPECT_NE(xml.find("tests=\"2\" failures=\"1\""), std::string::npos) << xml;
   // A file of an earlier start does not pass for that of one that failed.
@@ -147,43 +138,39 @@ TEST(EvaluateFolders, RequirementsBecomeTestCases) {
 // that of its flow files.
 TEST(EvaluateFolders, MotionFromCamerasAndDepth) {
   const TemporaryFolder folder;
-  SynthOptions synth;
-  synth.views = 7;
-  synth.size = "64x48";
-  WriteSyntheticCapture(folder / "s", synth);
+  WriteCapture(folder / "s", 7, "64x48");
   const auto evaluate = [&](const std::vector<std::string>& more, const std::string& out) {
-    std::vector<std::string> words{"--frames",    folder / "s/images",
-                                   "--reference", folder / "s/images",
-                                   "--out",       folder / out};
-    words.insert(words.end(), more.begin(), more.end());
-    return Evaluate(words);
+    return Evaluate(testing::Joined({"--frames", folder / "s/images", "--reference",
+                                     folder / "s/images", "--out", folder / out},
+                                    more));
   };
-  const Outcome exact =
+  const ProgramOutcome exact =
       evaluate({"--protocol", "geometry", "--poses", folder / "s/truth/transforms.json",
                 "--depth", folder / "s/truth/depth"},
                "exact");
   ASSERT_EQ(exact.code, 0) << exact.text;
-  const Outcome flow = evaluate({"--flow", "files:" + (folder / "s/truth/flow")}, "flow");
+  const ProgramOutcome flow =
+      evaluate({"--flow", "files:" + (folder / "s/truth/flow")}, "flow");
   ASSERT_EQ(flow.code, 0) << flow.text;
   const JsonValue a = ReadJsonFile(folder / "exact/report.json"),
                   b = ReadJsonFile(folder / "flow/report.json");
   EXPECT_EQ(a.At("stages").At("evaluate").At("protocol").AsString(), "geometry");
   for (const int gap : {1, 5}) {
-    EXPECT_GT(Row(a, "styled", gap).At("coverage").AsDouble(), gap == 1 ? 0.4 : 0.05);
+    EXPECT_GT(RowOf(a, "styled", gap).At("coverage").AsDouble(), gap == 1 ? 0.4 : 0.05);
     // Both compare all pixels of which the flow stays in the frame.
-    EXPECT_NEAR(Row(a, "styled", gap).At("tc_psnr_unmasked_mean_db").AsDouble(),
-                Row(b, "styled", gap).At("tc_psnr_unmasked_mean_db").AsDouble(), 0.05);
+    EXPECT_NEAR(RowOf(a, "styled", gap).At("tc_psnr_unmasked_mean_db").AsDouble(),
+                RowOf(b, "styled", gap).At("tc_psnr_unmasked_mean_db").AsDouble(), 0.05);
     // The mask leaves out what is hidden.
-    EXPECT_GT(Row(a, "styled", gap).At("tc_psnr_mean_db").AsDouble(),
-              Row(a, "styled", gap).At("tc_psnr_unmasked_mean_db").AsDouble() + 0.5);
+    EXPECT_GT(RowOf(a, "styled", gap).At("tc_psnr_mean_db").AsDouble(),
+              RowOf(a, "styled", gap).At("tc_psnr_unmasked_mean_db").AsDouble() + 0.5);
   }
   std::filesystem::remove(folder / "s/truth/depth/00003.npy");
-  const Outcome missing =
+  const ProgramOutcome missing =
       evaluate({"--mode", "geometry", "--poses", folder / "s/truth/transforms.json", "--depth",
                 folder / "s/truth/depth"},
                "missing");
   EXPECT_EQ(missing.code, 3) << missing.text;
-  EXPECT_OUTPUT(missing, "00003.png");
+  EXPECT_SAYS(missing, "00003.png");
   EXPECT_EQ(evaluate({"--mode", "geometry"}, "none").code, 2);
   EXPECT_EQ(evaluate({"--depth", folder / "s/truth/depth"}, "none").code, 2);
 }

@@ -13,19 +13,19 @@
 #include "pipeline/splat_files/read_splats.h"
 #include "pipeline/splat_files/splat_ply.h"
 #include "pipeline/stages/foreign_splats.h"
-#include "pipeline/synth/synth_capture.h"
 #include "reconstruct/colmap/colmap_model.h"
 #include "tests/support/evaluated_frames.h"
 #include "tests/support/expect_error.h"
 #include "tests/support/source_dir.h"
 #include "tests/support/splat_ball.h"
 #include "tests/support/splat_bytes.h"
+#include "tests/support/tiny_run.h"
 
 namespace regrade {
 namespace {
 
 using testing::Evaluate;
-using testing::Outcome;
+using testing::ProgramOutcome;
 using testing::TemporaryFolder;
 using testing::WriteText;
 
@@ -79,8 +79,8 @@ class EvaluateSplatFiles : public ::testing::Test {
     WriteText(folder_ / name, testing::PlyOf(splats));
   }
 
-  Outcome Score(const std::vector<std::string>& files,
-                const std::vector<std::string>& more = {}) {
+  ProgramOutcome Score(const std::vector<std::string>& files,
+                       const std::vector<std::string>& more = {}) {
     std::vector<std::string> words{"--reference", folder_ / "plain.ply", "--cameras",
                                    folder_ / "cameras.json", "--splats"};
     for (const std::string& file : files) words.push_back(folder_ / file);
@@ -90,13 +90,6 @@ class EvaluateSplatFiles : public ::testing::Test {
 
   JsonValue ReportOf(const std::string& out) const {
     return ReadJsonFile(folder_ / (out + "/report.json"));
-  }
-
-  static JsonValue RowOf(const JsonValue& report, const std::string& sequence, int gap = 1) {
-    for (const JsonValue& row : report.At("consistency").AsArray())
-      if (row.At("sequence").AsString() == sequence && row.At("gap").AsInt() == gap) return row;
-    ADD_FAILURE() << "no row of " << sequence << " at gap " << gap;
-    return {};
   }
 
   TemporaryFolder folder_;
@@ -111,9 +104,9 @@ Image InEightBits(Image image) {
 
 // The same numbers by another road: frames and depth in memory, without files between.
 TEST_F(EvaluateSplatFiles, MotionIsThatOfTheReferencesDepth) {
-  const Outcome outcome = Score({"strong.ply"}, {"--out", folder_ / "out"});
+  const ProgramOutcome outcome = Score({"strong.ply"}, {"--out", folder_ / "out"});
   ASSERT_EQ(outcome.code, 0) << outcome.text;
-  EXPECT_OUTPUT(outcome, "8 frames at the cameras of ");
+  EXPECT_SAYS(outcome, "8 frames at the cameras of ");
   const JsonValue report = ReportOf("out");
   EXPECT_EQ(report.At("stages").At("evaluate").At("protocol").AsString(), "geometry");
   EXPECT_EQ(report.Find("remarks"), nullptr);
@@ -131,8 +124,7 @@ TEST_F(EvaluateSplatFiles, MotionIsThatOfTheReferencesDepth) {
     return FrameSource{kShots, [pictures](int i) { return pictures[static_cast<size_t>(i)]; }};
   };
   const FrameSource plain = frames("plain.ply"), strong = frames("strong.ply");
-  ConsistencyOptions options;
-  options.mode = "geometry";
+  ConsistencyOptions options{.mode = "geometry"};
   const ConsistencyReport expected = EvaluateConsistency(
       plain, {{"source", plain}, {"styled", strong}}, options, {}, [&](int i) {
         return FrameGeometry{depth[static_cast<size_t>(i)],
@@ -153,7 +145,7 @@ TEST_F(EvaluateSplatFiles, MotionIsThatOfTheReferencesDepth) {
 
   // What is kept is enough for the same numbers, and for frames of other methods.
   const std::string kept = folder_ / "out/rendered/";
-  const Outcome again =
+  const ProgramOutcome again =
       Evaluate({"--frames", kept + "styled", "--reference", kept + "source", "--poses",
                 kept + "transforms.json", "--depth", kept + "depth", "--protocol", "geometry",
                 "--out", folder_ / "again"});
@@ -166,13 +158,10 @@ TEST_F(EvaluateSplatFiles, MotionIsThatOfTheReferencesDepth) {
 // where it gives the cameras, and else black.
 TEST_F(EvaluateSplatFiles, TheBackgroundIsChosen) {
   const auto corner = [&](const std::string& cameras, const std::vector<std::string>& more) {
-    std::vector<std::string> words{"--splats",    folder_ / "weak.ply",
-                                   "--reference", folder_ / "plain.ply",
-                                   "--cameras",   cameras,
-                                   "--gaps",      "1",
-                                   "--out",       folder_ / "out"};
-    words.insert(words.end(), more.begin(), more.end());
-    const Outcome outcome = Evaluate(words);
+    const ProgramOutcome outcome = Evaluate(
+        testing::Joined({"--splats", folder_ / "weak.ply", "--reference", folder_ / "plain.ply",
+                         "--cameras", cameras, "--gaps", "1", "--out", folder_ / "out"},
+                        more));
     EXPECT_EQ(outcome.code, 0) << outcome.text;
     const Image frame = ReadImage(folder_ / "out/rendered/styled/00003.png");
     return Vec3f{frame.at(0, 0)[0], frame.at(0, 0)[1], frame.at(0, 0)[2]};
@@ -191,11 +180,11 @@ TEST_F(EvaluateSplatFiles, TheBackgroundIsChosen) {
 }
 
 TEST_F(EvaluateSplatFiles, SeveralFilesAreComparedWithTheFirst) {
-  const Outcome outcome =
+  const ProgramOutcome outcome =
       Score({"strong.ply", "weak.ply", "strong.ply"},
             {"--label", "Ours", "Other", "Copy", "--gaps", "1", "--out", folder_ / "out"});
   ASSERT_EQ(outcome.code, 0) << outcome.text;
-  EXPECT_OUTPUT(outcome, "minus Ours");
+  EXPECT_SAYS(outcome, "minus Ours");
   const JsonValue report = ReportOf("out");
   EXPECT_EQ(report.At("labels").At("styled_2").AsString(), "Other");
   EXPECT_GT(RowOf(report, "styled_2").At("tc_psnr_difference_db").AsDouble(), 3);
@@ -210,8 +199,9 @@ TEST_F(EvaluateSplatFiles, SeveralFilesAreComparedWithTheFirst) {
 TEST_F(EvaluateSplatFiles, TheReferenceItselfIsNoWorseThanTheReference) {
   const std::string style = testing::SourceDir() + "/assets/style_sunset.png";
   ASSERT_EQ(Score({"plain.ply"}, {"--out", folder_ / "first"}).code, 0);
-  const Outcome outcome = Score({"plain.ply"}, {"--style", style, "--out", folder_ / "out",
-                                                "--target", folder_ / "first/rendered/source"});
+  const ProgramOutcome outcome =
+      Score({"plain.ply"}, {"--style", style, "--out", folder_ / "out", "--target",
+                            folder_ / "first/rendered/source"});
   ASSERT_EQ(outcome.code, 0) << outcome.text;
   const JsonValue report = ReportOf("out");
   for (const int gap : {1, 5})
@@ -227,29 +217,29 @@ TEST_F(EvaluateSplatFiles, TheReferenceItselfIsNoWorseThanTheReference) {
 TEST_F(EvaluateSplatFiles, AnotherGeometryIsSaid) {
   Write("moved.ply", Moved(plain_, 0.3f));
   Write("elsewhere.ply", Moved(plain_, 300));
-  const Outcome moved = Score({"moved.ply"}, {"--gaps", "1", "--out", folder_ / "out"});
+  const ProgramOutcome moved = Score({"moved.ply"}, {"--gaps", "1", "--out", folder_ / "out"});
   ASSERT_EQ(moved.code, 0) << moved.text;
-  EXPECT_OUTPUT(moved, "not at the depth of the reference's");
+  EXPECT_SAYS(moved, "not at the depth of the reference's");
   EXPECT_NE(ReportOf("out").At("remarks").AsArray().at(0).AsString().find("moved.ply: "),
             std::string::npos);
-  const Outcome elsewhere = Score({"elsewhere.ply"});
+  const ProgramOutcome elsewhere = Score({"elsewhere.ply"});
   EXPECT_EQ(elsewhere.code, 3) << elsewhere.text;
-  EXPECT_OUTPUT(elsewhere, "elsewhere.ply: no camera sees anything of these splats");
+  EXPECT_SAYS(elsewhere, "elsewhere.ply: no camera sees anything of these splats");
 }
 
 TEST_F(EvaluateSplatFiles, CamerasDecideWhatIsSeen) {
   WriteCamerasJson(folder_ / "cameras.json", Shots({0, 500, 0}));
-  const Outcome nothing = Score({"weak.ply"}, {"--out", folder_ / "out"});
+  const ProgramOutcome nothing = Score({"weak.ply"}, {"--out", folder_ / "out"});
   EXPECT_EQ(nothing.code, 3) << nothing.text;
-  EXPECT_OUTPUT(nothing, "plain.ply: no camera sees anything of these splats");
-  EXPECT_OUTPUT(nothing, "--cameras in the world of the splats");
+  EXPECT_SAYS(nothing, "plain.ply: no camera sees anything of these splats");
+  EXPECT_SAYS(nothing, "--cameras in the world of the splats");
   std::vector<BareCamera> shots = Shots();
   shots[7].camera.camera_from_world = shots[0].camera.camera_from_world;
   shots[7].camera.camera_from_world.translation.y += 500;
   WriteCamerasJson(folder_ / "cameras.json", shots);
-  const Outcome one = Score({"weak.ply"}, {"--out", folder_ / "out"});
+  const ProgramOutcome one = Score({"weak.ply"}, {"--out", folder_ / "out"});
   EXPECT_EQ(one.code, 0) << one.text;
-  EXPECT_OUTPUT(one, "plain.ply: 1 of 8 frames show nothing of it");
+  EXPECT_SAYS(one, "plain.ply: 1 of 8 frames show nothing of it");
 }
 
 // Photos in no order are flown past, as by a film; views without cameras are placed first.
@@ -258,15 +248,16 @@ TEST_F(EvaluateSplatFiles, CamerasWithoutOrderBecomeAPath) {
   for (int i = 0; i < kShots; ++i)
     shots[static_cast<size_t>(i)].name = "shot" + std::to_string((5 * i) % kShots);
   WriteCamerasJson(folder_ / "cameras.json", shots);
-  const Outcome mixed = Score({"weak.ply"}, {"--gaps", "1", "--out", folder_ / "out"});
+  const ProgramOutcome mixed = Score({"weak.ply"}, {"--gaps", "1", "--out", folder_ / "out"});
   ASSERT_EQ(mixed.code, 0) << mixed.text;
-  EXPECT_OUTPUT(mixed, "120 frames of a path past the cameras of ");
+  EXPECT_SAYS(mixed, "120 frames of a path past the cameras of ");
   EXPECT_EQ(RowOf(ReportOf("out"), "styled").At("pairs").AsInt(), 119);
 
-  const Outcome placed = Evaluate({"--splats", folder_ / "weak.ply", "--reference",
-                                   folder_ / "plain.ply", "--size", "64", "--gaps", "1"});
+  const ProgramOutcome placed =
+      Evaluate({"--splats", folder_ / "weak.ply", "--reference", folder_ / "plain.ply",
+                "--size", "64", "--gaps", "1"});
   ASSERT_EQ(placed.code, 0) << placed.text;
-  EXPECT_OUTPUT(placed, "120 frames of a path past the placed views, 64x");
+  EXPECT_SAYS(placed, "120 frames of a path past the placed views, 64x");
 }
 
 TEST_F(EvaluateSplatFiles, WhatIsNoSceneIsRefused) {
@@ -304,19 +295,16 @@ TEST_F(EvaluateSplatFiles, WhatIsNoSceneIsRefused) {
              folder_ / "cameras.json"},
             3,
             "not.ply"}}) {
-    const Outcome outcome = Evaluate(wrong.words);
+    const ProgramOutcome outcome = Evaluate(wrong.words);
     EXPECT_EQ(outcome.code, wrong.code) << wrong.part << "\n" << outcome.text;
-    EXPECT_OUTPUT(outcome, wrong.part);
+    EXPECT_SAYS(outcome, wrong.part);
   }
 }
 
 // Captures whose photos are there give the same cameras as their files, in the photos' order.
 TEST(CaptureCameras, PhotosMayBeThere) {
   const TemporaryFolder folder;
-  SynthOptions synth;
-  synth.views = 11;
-  synth.size = "96x72";
-  WriteSyntheticCapture(folder / "s", synth);
+  testing::WriteCapture(folder / "s", 11, "96x72");
   const TransformsFile truth = ReadTransformsJson(folder / "s/truth/transforms.json");
   const auto expect_truth = [&](const std::string& capture) {
     const std::vector<BareCamera> cameras = CamerasOfCapture(capture, {});

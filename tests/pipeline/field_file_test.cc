@@ -16,15 +16,18 @@
 #include "pipeline/files/npz_file.h"
 #include "tests/support/expect_error.h"
 #include "tests/support/peak_memory.h"
+#include "tests/support/pinhole.h"
+#include "tests/support/small_archive.h"
 #include "tests/support/small_field.h"
 #include "tests/support/temporary_folder.h"
+#include "tests/support/wavy_picture.h"
 
 namespace regrade {
 namespace {
 
+using testing::LargestDifference;
 using testing::ReadText;
 using testing::TemporaryFolder;
-using testing::WriteText;
 
 // A 3 x 4 x 5 grid with 17 voxels.
 StoredField SmallField(int basis) {
@@ -220,21 +223,12 @@ void WriteForeign(const RadianceField& field, const std::string& path) {
   writer.WriteTo(path);
 }
 
-float LargestDifference(const Image& a, const Image& b) {
-  float largest = 0;
-  for (size_t i = 0; i < a.pixels.size(); ++i)
-    largest = std::max(largest, std::abs(a.pixels[i] - b.pixels[i]));
-  return largest;
-}
-
 // Read, rendered, written, read again, rendered: svox2's checkpoints lose no bit, because their
 // colours are halves already; a field of ours is rounded to halves once. Measured: 1.2e-4,
 // required: 1e-3.
 TEST(FieldFile, RoundTripInSvox2sLayoutKeepsRenders) {
   const TemporaryFolder folder;
-  Camera camera;
-  camera.width = 64, camera.height = 48;
-  camera.fx = camera.fy = 60, camera.cx = 32, camera.cy = 24;
+  Camera camera = testing::PinholeOf(64, 48, 60);
   camera.camera_from_world.translation = {0, 0, 2.5};
   for (const bool background : {false, true}) {
     StoredField ours{testing::RandomField({12, 14, 10}, 9, 0.6, 5), {}, {}};
@@ -265,22 +259,7 @@ class Changed : public ::testing::Test {
   template <typename T>
   void ReadWith(const std::string& name, const std::vector<int64_t>& shape, const T* data) {
     WriteFieldFile(folder_ / "field.npz", SmallField(9));
-    NpzReader reader(folder_ / "field.npz", 1 << 20);
-    std::vector<NpzArray> kept;
-    for (const std::string& other : reader.names()) kept.push_back(reader.Read(other));
-    NpzWriter writer;
-    size_t i = 0;
-    for (const std::string& other : reader.names()) {
-      const NpzArray& array = kept[i++];
-      if (other == name) continue;
-      if (array.type == ArrayType::kF32) writer.Add(other, array.shape, array.As<float>());
-      if (array.type == ArrayType::kI32) writer.Add(other, array.shape, array.As<int32_t>());
-      if (array.type == ArrayType::kI64) writer.Add(other, array.shape, array.As<int64_t>());
-      if (array.type == ArrayType::kF16) writer.Add(other, array.shape, array.As<uint16_t>());
-      if (array.type == ArrayType::kF64) writer.Add(other, array.shape, array.As<double>());
-    }
-    writer.Add(name, shape, data);
-    writer.WriteTo(folder_ / "changed.npz");
+    testing::ReplaceArray(folder_ / "field.npz", folder_ / "changed.npz", name, shape, data);
     before_ = ReadText(folder_ / "changed.npz");
     ReadFieldFile(folder_ / "changed.npz");
   }

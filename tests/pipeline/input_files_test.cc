@@ -8,21 +8,22 @@
 #include "pipeline/capture/ingest_photos.h"
 #include "tests/pipeline/clip_file.h"
 #include "tests/pipeline/picture_corpus.h"
+#include "tests/support/expect_error.h"
 
 namespace regrade {
 namespace {
 
 using testing::Contains;
 using testing::Photo;
-using testing::ScratchFolder;
-using testing::WriteBytes;
+using testing::TemporaryFolder;
 using testing::WriteClip;
+using testing::WriteText;
 
 class InputFolder : public ::testing::Test {
  protected:
   InputFolder() { std::filesystem::create_directories(folder_); }
   void PutPhoto(const std::string& name, int width = 400, int height = 300) {
-    WriteBytes(folder_ + "/" + name, EncodeJpeg(Photo(width, height, seed_++), 90));
+    WriteText(folder_ + "/" + name, EncodeJpeg(Photo(width, height, seed_++), 90));
   }
   void PutClip(const std::string& name, int frames) {
     std::vector<Image> pictures;
@@ -37,14 +38,9 @@ class InputFolder : public ::testing::Test {
                                                 : "photo";
     return "not listed";
   }
-  static std::string WhyNot(const IngestResult& result, const std::string& file) {
-    for (const PhotoStatus& photo : result.statuses)
-      if (photo.file == file) return photo.status == PhotoState::kUsed ? "used" : photo.why;
-    return "not listed";
-  }
   IngestResult Ingest() { return IngestPhotos(folder_, scratch_ / "out", {}, {}); }
 
-  ScratchFolder scratch_;
+  TemporaryFolder scratch_;
   const std::string folder_ = scratch_ / "in";
   uint64_t seed_ = 1;
 };
@@ -58,7 +54,7 @@ TEST_F(InputFolder, F92_LiveClipsSidecarsAndSmallCopiesAreLeft) {
   PutClip("GOPR1.LRV", 20);
   PutPhoto("GOPR1.THM", 160, 120);
   for (const char* name : {"IMG_1.AAE", "IMG_1.xmp", "IMG_2.JPG.json"})
-    WriteBytes(folder_ + "/" + name, "<sidecar/>");
+    WriteText(folder_ + "/" + name, "<sidecar/>");
   const InputFiles inputs = ListInputs(folder_);
   EXPECT_EQ(WhyLeft(inputs, "IMG_1.MOV"), "the live-photo clip of IMG_1.JPG");
   EXPECT_EQ(WhyLeft(inputs, "IMG_2.MOV"), "film");
@@ -69,7 +65,7 @@ TEST_F(InputFolder, F92_LiveClipsSidecarsAndSmallCopiesAreLeft) {
   EXPECT_EQ(WhyLeft(ListInputs(folder_, false), "other.mp4"), "a film has no given poses");
 
   const IngestResult result = Ingest();
-  EXPECT_EQ(WhyNot(result, "IMG_1.AAE"), "not an image");
+  EXPECT_EQ(testing::WhyNot(result, "IMG_1.AAE"), "not an image");
   EXPECT_TRUE(Contains(result.summary, "taken: 4 photos (400 x 300), ")) << result.summary;
   EXPECT_TRUE(Contains(result.summary, "frames of IMG_2.MOV")) << result.summary;
   EXPECT_TRUE(Contains(result.summary, "1 x live-photo clip")) << result.summary;
@@ -92,7 +88,7 @@ TEST_F(InputFolder, F92_ThumbnailsAreLeftWhereverTheyStand) {
   WritePng8(folder_ + "/e.png", cut_out);
   const IngestResult result = Ingest();
   ASSERT_EQ(result.photos.size(), 5u);
-  EXPECT_EQ(WhyNot(result, "a thumbs/a.jpg"), "a thumbnail: 160 x 120");
+  EXPECT_EQ(testing::WhyNot(result, "a thumbs/a.jpg"), "a thumbnail: 160 x 120");
   for (size_t i = 0; i < 4; ++i) {
     EXPECT_EQ(result.photos[i].file, names[i]);
     EXPECT_EQ(result.photos[i].name, "0000" + std::to_string(i) + ".png");
@@ -114,7 +110,7 @@ TEST_F(InputFolder, F92_SmallPhotosAmongOthersAreKept) {
 TEST_F(InputFolder, F92_ARawFileBesideItsPictureIsLeft) {
   PutPhoto("DSC_1.JPG");
   for (const char* name : {"DSC_1.NEF", "DSC_2.NEF"})
-    WriteBytes(folder_ + "/" + name, testing::FloatTiff(Photo(64, 64, 1)));
+    WriteText(folder_ + "/" + name, testing::FloatTiff(Photo(64, 64, 1)));
   const InputFiles inputs = ListInputs(folder_);
   EXPECT_EQ(WhyLeft(inputs, "DSC_1.NEF"), "the raw file of DSC_1.JPG");
   EXPECT_EQ(WhyLeft(inputs, "DSC_2.NEF"), "photo");
@@ -127,15 +123,10 @@ TEST_F(InputFolder, F92_APathMayBeAFilm) {
   EXPECT_EQ(inputs.files[0].kind, InputKind::kClip);
   EXPECT_EQ(inputs.files[0].file.name, "a.mp4");
   PutPhoto("b.jpg");
-  WriteBytes(folder_ + "/empty.mp4", "");
+  WriteText(folder_ + "/empty.mp4", "");
   for (const char* name : {"b.jpg", "empty.mp4"}) {
-    try {
-      ListInputs(folder_ + "/" + name);
-      FAIL() << name;
-    } catch (const Error& error) {
-      EXPECT_EQ(error.code(), ExitCode::kInput);
-      EXPECT_EQ(error.where(), folder_ + "/" + name);
-    }
+    EXPECT_REGRADE_ERROR(ListInputs(folder_ + "/" + name), ExitCode::kInput,
+                         folder_ + "/" + name + ": ");
   }
   EXPECT_EQ(PlannedInputs(ListInputs(folder_), {}),
             "2 files and 1 film (0.1 s), of which 40 to 120 frames are picked");

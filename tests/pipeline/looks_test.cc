@@ -30,13 +30,11 @@ TEST(Looks, ALutIsAStyleAndAStyleALut) {
   const TemporaryFolder folder;
   testing::WriteCapture(folder / "s", 6, "96x72");
   WriteText(folder / "warm.cube", CubeText(TabulateColors(17, Look), "warm"));
-  std::vector<std::string> run{"run",     folder / "s/truth",   "--out",    folder / "out",
-                               "--style", folder / "warm.cube", "--device", "cpu"};
-  for (const std::string& flag : testing::TinyFlags()) run.push_back(flag);
-  const ProgramOutcome outcome = Regrade(run);
+  const ProgramOutcome outcome = Regrade({"run", folder / "s/truth", "--out", folder / "out",
+                                          "--style", folder / "warm.cube", "--device", "cpu"},
+                                         testing::TinyFlags());
   ASSERT_EQ(outcome.code, 0) << outcome.text;
-  EXPECT_NE(outcome.text.find("the LUT magnifies differences"), std::string::npos)
-      << outcome.text;
+  EXPECT_SAYS(outcome, "the LUT magnifies differences");
 
   // 2D frames are the LUT on the frames' pixels: to the rounding of both files to 8 bits, which
   // the LUT magnifies 1.9 times at most.
@@ -56,11 +54,9 @@ TEST(Looks, ALutIsAStyleAndAStyleALut) {
 
   // What cannot go with a LUT.
   const auto refused = [&](std::vector<std::string> more, const std::string& says) {
-    std::vector<std::string> command{"stylize", folder / "out"};
-    command.insert(command.end(), more.begin(), more.end());
-    const ProgramOutcome end = Regrade(command);
+    const ProgramOutcome end = Regrade({"stylize", folder / "out"}, more);
     EXPECT_NE(end.code, 0);
-    EXPECT_NE(end.text.find(says), std::string::npos) << end.text;
+    EXPECT_SAYS(end, says);
   };
   refused({"--style", folder / "warm.cube", "--method", "gmm"}, "a LUT is its own method");
   WriteText(folder / "preset.xmp", "<x:xmpmeta/>");
@@ -72,7 +68,7 @@ TEST(Looks, ALutIsAStyleAndAStyleALut) {
   const ProgramOutcome exported =
       Regrade({"export", folder / "out", "--format", "cube", "--out", folder / "back.cube"});
   ASSERT_EQ(exported.code, 0) << exported.text;
-  EXPECT_NE(exported.text.find("dB from the styled scene"), std::string::npos) << exported.text;
+  EXPECT_SAYS(exported, "dB from the styled scene");
   const ColorLut back = ReadCubeFile(folder / "back.cube");
   ASSERT_EQ(back.table.size, 33);
   EXPECT_EQ(back.title, "warm");

@@ -50,8 +50,7 @@ class MaskPicture : public ::testing::Test {
   }
   // What --masks makes of it.
   Image Object() const {
-    MaskOptions options;
-    options.masks = folder_ / "m";
+    MaskOptions options{.masks = folder_ / "m"};
     return ObjectMasks(options, {"a.jpg"}).Coverage(0, kWidth, kHeight).at(0);
   }
   TemporaryFolder folder_;

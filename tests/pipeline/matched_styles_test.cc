@@ -54,7 +54,7 @@ TEST(MatchedStyles, EachRegionTakesItsPictureAndTheStyleIsLikeAnyOther) {
                          "regions", "--scene-wide"});
   ProgramOutcome outcome = Regrade(run);
   ASSERT_EQ(outcome.code, 0) << outcome.text;
-  EXPECT_NE(outcome.text.find("% like sky.png"), std::string::npos) << outcome.text;
+  EXPECT_SAYS(outcome, "% like sky.png");
 
   // One style, in every record, with a page.
   EXPECT_EQ(StyleNames(folder / "out"), std::vector<std::string>{"sky-wall"});
@@ -86,10 +86,8 @@ TEST(MatchedStyles, EachRegionTakesItsPictureAndTheStyleIsLikeAnyOther) {
   }
 
   // Again, as a mixture, and on a sheet.
-  EXPECT_EQ(Regrade({"stylize", folder / "out", "--style", sky, "--style", wall, "--match",
-                     "regions", "--scene-wide"})
-                .code,
-            0);
+  testing::Said({"stylize", folder / "out", "--style", sky, "--style", wall, "--match",
+                 "regions", "--scene-wide"});
   EXPECT_EQ(StyleNames(folder / "out").size(), 1u);
   outcome = Regrade({"render", folder / "out", "--until", "render"});
   EXPECT_EQ(outcome.code, 0) << outcome.text;
@@ -107,11 +105,9 @@ TEST(MatchedStyles, EachRegionTakesItsPictureAndTheStyleIsLikeAnyOther) {
   outcome = Regrade({"stylize", folder / "out", "--style", sky, "--style", folder / "sky2.png",
                      "--style", wall, "--match", "regions"});
   EXPECT_EQ(outcome.code, 3) << outcome.text;
-  EXPECT_NE(outcome.text.find("--style-mask"), std::string::npos) << outcome.text;
+  EXPECT_SAYS(outcome, "--style-mask");
   const auto refused = [&](std::vector<std::string> more) {
-    std::vector<std::string> command{"stylize", folder / "out"};
-    command.insert(command.end(), more.begin(), more.end());
-    return Regrade(command).code;
+    return Regrade({"stylize", folder / "out"}, more).code;
   };
   EXPECT_EQ(refused({"--style", sky, "--match", "regions"}), 2);
   EXPECT_EQ(refused({"--style", sky, "--style", wall, "--match", "regions", "--masks",

@@ -12,6 +12,7 @@
 #include "pipeline/capture/capture_source.h"
 #include "pipeline/files/json_file.h"
 #include "pipeline/images/image_file.h"
+#include "tests/support/pictures.h"
 #include "tests/support/temporary_folder.h"
 
 namespace regrade {
@@ -20,13 +21,6 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr int kPhotoWidth = 64, kPhotoHeight = 48, kDepthViews = 5;
-
-Image GreyPicture(int width, int height, int channels, float value) {
-  Image image;
-  image.width = width, image.height = height, image.channels = channels;
-  image.pixels.assign(static_cast<size_t>(width) * height * channels, value);
-  return image;
-}
 
 class MeasuredDepths : public ::testing::Test {
  protected:
@@ -65,7 +59,7 @@ class MeasuredDepths : public ::testing::Test {
 
   // Half as large as the photos, in thousandths of `unit`.
   std::string WriteMap(int view, double unit, bool flat = false) {
-    Image map = GreyPicture(kPhotoWidth / 2, kPhotoHeight / 2, 1, 0);
+    Image map = testing::ConstantImage(kPhotoWidth / 2, kPhotoHeight / 2, 0, 1);
     for (int y = 0; y < map.height; ++y)
       for (int x = 0; x < map.width; ++x) {
         const uint64_t pixel = static_cast<uint64_t>(y * map.width + x);
@@ -111,13 +105,13 @@ TEST_F(MeasuredDepths, OnlyMapsOf16BitsAndOneChannelAreTaken) {
   };
   testing::WriteText(maps[1], "no picture");
   expect_left("");
-  WritePng8(maps[1], GreyPicture(32, 24, 1, 0.5f));
+  WritePng8(maps[1], testing::ConstantImage(32, 24, 0.5f, 1));
   expect_left("not one channel of 16 bits");
-  WritePng16(maps[1], GreyPicture(32, 24, 3, 0.5f));
+  WritePng16(maps[1], testing::ConstantImage(32, 24, 0.5f, 3));
   expect_left("not one channel of 16 bits");
-  WritePng16(maps[1], GreyPicture(24, 24, 1, 0.5f));
+  WritePng16(maps[1], testing::ConstantImage(24, 24, 0.5f, 1));
   expect_left("");
-  WritePng16(maps[1], GreyPicture(32, 24, 1, 0.5f));
+  WritePng16(maps[1], testing::ConstantImage(32, 24, 0.5f, 1));
   EXPECT_EQ(stage(0.25), 1);
   EXPECT_EQ(notes[0], "1 map of measured depths: the fit takes them as points");
   std::map<std::string, std::string> found;
@@ -178,7 +172,7 @@ TEST_F(MeasuredDepths, WithoutPointsTheUnitIsWhatThePosesSay) {
 }
 
 TEST_F(MeasuredDepths, TransformsNameThem) {
-  WritePng8(folder_ / "0.png", GreyPicture(kPhotoWidth, kPhotoHeight, 3, 0.5f));
+  WritePng8(folder_ / "0.png", testing::ConstantImage(kPhotoWidth, kPhotoHeight, 0.5f, 3));
   WriteMap(0, 1);
   JsonValue::Array rows;
   for (int i = 0; i < 4; ++i) {

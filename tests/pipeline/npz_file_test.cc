@@ -248,25 +248,6 @@ TEST(Npz, F71_OffsetsOutsideTheFile) {
   }
 }
 
-TEST(Npz, RandomMutantsOnlyEverThrowError) {
-  const TemporaryFolder folder;
-  const std::string bytes = SmallArchive();
-  const uint64_t kEdges[] = {0, 1, 0x7fffffff, 0x80000000, 0xffffffff, 0xffff};
-  for (uint64_t round = 0; round < 500; ++round) {
-    std::string mutant = bytes;
-    for (uint64_t k = 0; k < 1 + round % 3; ++k) {
-      const size_t at = RandomIndex(1, round, 3 * k, bytes.size() - 4);
-      const int size = 1 << RandomIndex(1, round, 3 * k + 1, 3);
-      mutant = Patched(mutant, at, kEdges[RandomIndex(1, round, 3 * k + 2, 6)], size);
-    }
-    WriteText(folder / "a.npz", mutant);
-    try {
-      ReadEverything(folder / "a.npz");
-    } catch (const Error&) {
-    }
-  }
-}
-
 std::string Npy(const std::string& dictionary) {
   std::string bytes = std::string("\x93NUMPY\x01\x00", 8);
   bytes += static_cast<char>(dictionary.size() & 255);

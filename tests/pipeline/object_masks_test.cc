@@ -37,8 +37,7 @@ TEST(ObjectMasks, FoundByNameAndBroughtToTheViewsSize) {
   const TemporaryFolder folder;
   std::filesystem::create_directories(folder / "m");
   WriteBands(folder / "m/IMG_2.png", 40, 20, {{kWhite, {10, 20}}});
-  MaskOptions options;
-  options.masks = folder / "m";
+  MaskOptions options{.masks = folder / "m"};
   const ObjectMasks masks(options, {"IMG_1.jpg", "IMG_2.jpg"});
   EXPECT_EQ(masks.num_known(), 1);
   EXPECT_FALSE(masks.Knows(0));
@@ -56,9 +55,7 @@ TEST(ObjectMasks, H50_LabelsOfSeveralRegionsSumToAtMostOne) {
   std::filesystem::create_directories(folder / "m");
   WriteBands(folder / "m/a.png", 40, 20, {{kRed, {0, 10}}, {kBlue, {10, 25}}});
   WriteBands(folder / "style.png", 60, 10, {{kBlue, {0, 30}}, {kRed, {30, 50}}});
-  MaskOptions options;
-  options.masks = folder / "m";
-  options.style_mask = folder / "style.png";
+  MaskOptions options{.masks = folder / "m", .style_mask = folder / "style.png"};
   const ObjectMasks masks(options, {"a.jpg"});
   ASSERT_EQ(masks.num_regions(), 2);  // blue comes first in the style
   const std::vector<Image> coverage = masks.Coverage(0, 20, 10);
@@ -93,39 +90,13 @@ double Change(const Image& a, const Image& b, const Image& mask, bool inside) {
 TEST(ObjectMasks, H50_ARunWithWrongMasksRestylesTheObjectAlone) {
   const TemporaryFolder folder;
   const std::string style = testing::SourceDir() + "/assets/style_sunset.png";
-  const auto regrade = [](const std::vector<std::string>& arguments) {
-    return testing::RunProgram(REGRADE_PROGRAM, arguments);
-  };
-  ASSERT_EQ(
-      regrade({"synth", folder / "s", "--views", "12", "--size", "96x72", "--effects", "masks"})
-          .code,
-      0);
-  std::vector<std::string> run{"run",
-                               folder / "s/truth",
-                               "--style",
-                               style,
-                               "--out",
-                               folder / "e",
-                               "--masks",
-                               folder / "s/masks",
-                               "--path",
-                               "views",
-                               "--photo-size",
-                               "96",
-                               "--field",
-                               "voxels",
-                               "--fit-resolutions",
-                               "32",
-                               "--fit-steps",
-                               "200",
-                               "--style-steps",
-                               "10",
-                               "--threads",
-                               "2",
-                               "--tracks",
-                               "given"};
-  const ProgramOutcome done = regrade(run);
-  ASSERT_EQ(done.code, 0) << done.text;
+  testing::Said(
+      {"synth", folder / "s", "--views", "12", "--size", "96x72", "--effects", "masks"});
+  testing::Said(testing::Joined(
+      {"run", folder / "s/truth", "--style", style, "--out", folder / "e", "--masks",
+       folder / "s/masks"},
+      testing::Words("--path views --photo-size 96 --field voxels --fit-resolutions 32 "
+                     "--fit-steps 200 --style-steps 10 --threads 2 --tracks given")));
   // View 2 was given a mask beside the ball, view 3 an empty one, view 5 a swollen one.
   double restyled = 0, spilled = 0;
   for (const char* name : {"00001", "00002", "00003", "00005"}) {
@@ -150,15 +121,18 @@ TEST(ObjectMasks, H50_ARunWithWrongMasksRestylesTheObjectAlone) {
     std::snprintf(name, sizeof name, "%05d.png", i);
     WritePng8(folder / ("none/" + std::string(name)), Image(96, 72, 1));
   }
-  const ProgramOutcome empty = regrade({"stylize", folder / "e", "--masks", folder / "none"});
+  const ProgramOutcome empty =
+      testing::Regrade({"stylize", folder / "e", "--masks", folder / "none"});
   ASSERT_EQ(empty.code, 0) << empty.text;
-  EXPECT_NE(empty.text.find("--mask-vote"), std::string::npos) << empty.text;
+  EXPECT_SAYS(empty, "--mask-vote");
   const auto pixels = [&](const char* path) { return ReadImage(folder / path).pixels; };
   EXPECT_EQ(pixels("e/styles/style_sunset/frames/styled/00001.png"),
             pixels("e/styles/style_sunset/frames/source/00001.png"));
 
-  EXPECT_EQ(regrade({"stylize", folder / "e", "--masks", folder / "nowhere"}).code, 3);
-  EXPECT_EQ(regrade({"stylize", folder / "e", "--masks", "", "--style-mask", style}).code, 2);
+  EXPECT_EQ(testing::Regrade({"stylize", folder / "e", "--masks", folder / "nowhere"}).code, 3);
+  EXPECT_EQ(
+      testing::Regrade({"stylize", folder / "e", "--masks", "", "--style-mask", style}).code,
+      2);
 }
 
 }  // namespace

@@ -88,7 +88,7 @@ TEST(PageCodec, EqualFieldsGiveEqualBytes) {
     EXPECT_EQ(a.sections[i].packed, b.sections[i].packed);
 }
 
-// Any byte of any section changed, or a section cut: an error, or a field that Validate passes.
+// Changed bytes of sections are the fuzz target's page_field.
 TEST(PageCodec, DamagedSectionsAreRefused) {
   for (const auto& [name, field] : Fields()) {
     if (field.appearance.basis != 4) continue;
@@ -97,18 +97,6 @@ TEST(PageCodec, DamagedSectionsAreRefused) {
       PageField cut = page;
       cut.sections[s].packed.pop_back();
       EXPECT_REGRADE_ERROR(DecodeField(cut), ExitCode::kInput, "damaged");
-      const std::string bytes = Inflate(page.sections[s].packed, 1 << 24, "test");
-      for (size_t k = 0; k < 12; ++k) {
-        std::string changed = bytes;
-        changed[k * bytes.size() / 12] ^= static_cast<char>(1 << (k % 8));
-        PageField damaged = page;
-        damaged.sections[s].packed = Deflate(changed);
-        try {
-          DecodeField(damaged);
-        } catch (const Error& error) {
-          EXPECT_EQ(static_cast<int>(error.code()), static_cast<int>(ExitCode::kInput));
-        }
-      }
       PageField missing = page;
       missing.sections.erase(missing.sections.begin() + static_cast<std::ptrdiff_t>(s));
       EXPECT_REGRADE_ERROR(DecodeField(missing), ExitCode::kInput, "is missing");

@@ -8,12 +8,12 @@
 
 #include "evaluate/pair_network.h"
 #include "kernels/image/color_statistics.h"
-#include "kernels/process/child_process.h"
 #include "pipeline/images/image_file.h"
 #include "stylize/image/monge_kantorovich.h"
 #include "tests/evaluate/synthetic_frames.h"
 #include "tests/support/data.h"
 #include "tests/support/expect_error.h"
+#include "tests/support/run_program.h"
 #include "tests/support/temporary_folder.h"
 #include "tests/support/tiny_onnx.h"
 
@@ -89,18 +89,12 @@ TEST(PairedBenchmark, FromTheCommandLine) {
   CheckRows(rows, 11);
   EXPECT_EQ(rows[0].pictures[9].name, "10");
   WriteText(folder / "lpips.onnx", testing::DistanceNetwork(48, 64));
-  const auto evaluate = [&](const std::vector<std::string>& more, std::string* text) {
-    ChildOptions options;
-    options.argv = {REGRADE_PROGRAM, "evaluate",         "--pst50", folder / "pst50",
-                    "--frames",      folder / "results", "--lpips", folder / "lpips.onnx",
-                    "--out",         folder / "out"};
-    options.argv.insert(options.argv.end(), more.begin(), more.end());
-    options.wall_limit_s = 120;
-    return RunChild(options, [&](const std::string& line) { *text += line + "\n"; })
-        .exit_status;
-  };
-  std::string text;
-  ASSERT_EQ(evaluate({"--controls"}, &text), 0) << text;
+  const std::vector<std::string> words{
+      "evaluate",         "--pst50", folder / "pst50",      "--frames",
+      folder / "results", "--lpips", folder / "lpips.onnx", "--out",
+      folder / "out"};
+  const testing::ProgramOutcome done = testing::Regrade(words, {"--controls"});
+  ASSERT_EQ(done.code, 0) << done.text;
   const JsonValue report = ReadJsonFile(folder / "out/report.json");
   const JsonValue& result = report.At("paired").AsArray()[0];
   EXPECT_EQ(result.At("number").AsInt(), 11);
@@ -108,8 +102,8 @@ TEST(PairedBenchmark, FromTheCommandLine) {
   EXPECT_GT(result.At("lpips").AsDouble(), 1e-4);
   EXPECT_EQ(report.At("pictures").AsArray().size(), 33u);
   EXPECT_TRUE(report.At("pictures").AsArray()[0].At("psnr_db").IsNull());  // infinite
-  EXPECT_NE(text.find("control_linear_map"), std::string::npos) << text;
-  EXPECT_EQ(evaluate({"--reference", folder / "results"}, &text), 2);
+  EXPECT_SAYS(done, "control_linear_map");
+  EXPECT_EQ(testing::Regrade(words, {"--reference", folder / "results"}).code, 2);
 
   std::filesystem::remove(folder / "results/7.png");
   EXPECT_REGRADE_ERROR(MeasurePairedFolder(benchmark, {}, {}), ExitCode::kInput,

@@ -11,16 +11,16 @@ namespace {
 
 namespace fs = std::filesystem;
 using testing::Photo;
-using testing::ReadBytes;
-using testing::ScratchFolder;
-using testing::WriteBytes;
+using testing::ReadText;
+using testing::TemporaryFolder;
+using testing::WriteText;
 
 class PhotoBits : public ::testing::Test {
  protected:
   PhotoBits() { fs::create_directory(folder_); }
   IngestResult Ingest() { return IngestPhotos(folder_, staging_, {}, {}); }
 
-  ScratchFolder scratch_;
+  TemporaryFolder scratch_;
   std::string folder_ = scratch_ / "photos", staging_ = scratch_ / "out/poses/photos";
 };
 
@@ -60,10 +60,10 @@ CaptureView ViewOf(const StagedPhoto& photo) {
 }
 
 TEST_F(PhotoBits, SixteenReachTheFit) {
-  WriteBytes(folder_ + "/a.png", EncodePng16(WidePhoto(1)));
-  WriteBytes(folder_ + "/b.tif", WideTiff(WidePhoto(2)));
-  WriteBytes(folder_ + "/c.png", EncodePng8(Photo(96, 64, 3)));
-  WriteBytes(folder_ + "/d.tif", testing::FloatTiff(WidePhoto(4)));
+  WriteText(folder_ + "/a.png", EncodePng16(WidePhoto(1)));
+  WriteText(folder_ + "/b.tif", WideTiff(WidePhoto(2)));
+  WriteText(folder_ + "/c.png", EncodePng8(Photo(96, 64, 3)));
+  WriteText(folder_ + "/d.tif", testing::FloatTiff(WidePhoto(4)));
   const IngestResult result = Ingest();
   ASSERT_EQ(result.photos.size(), 4u);
   Capture capture;
@@ -81,31 +81,31 @@ TEST_F(PhotoBits, SixteenReachTheFit) {
       ASSERT_NEAR(after.pixels[k], before.pixels[k], i == 3 ? 0.51 / 65535 : 0) << photo.file;
   }
   // 8-bit photos are staged as ever.
-  EXPECT_EQ(ReadBytes(result.photos[2].path), EncodePng8(Photo(96, 64, 3)));
+  EXPECT_EQ(ReadText(result.photos[2].path), EncodePng8(Photo(96, 64, 3)));
   // The same picture in 8 bits is another one, and the other way round.
   const Image rounded = ReadImage(folder_ + "/c.png");
-  WriteBytes(folder_ + "/c.png", EncodePng16(rounded));
+  WriteText(folder_ + "/c.png", EncodePng16(rounded));
   EXPECT_EQ(DecodePhoto(Ingest().photos[2].path).bits, 16);
-  WriteBytes(folder_ + "/c.png", EncodePng8(rounded));
+  WriteText(folder_ + "/c.png", EncodePng8(rounded));
   EXPECT_EQ(DecodePhoto(Ingest().photos[2].path).bits, 8);
 }
 
 TEST_F(PhotoBits, ColmapGetsEight) {
   for (int i = 0; i < 3; ++i)
-    WriteBytes(folder_ + "/p" + std::to_string(i) + ".jpg",
-               EncodeJpeg(Photo(96, 64, static_cast<uint64_t>(i)), 90));
+    WriteText(folder_ + "/p" + std::to_string(i) + ".jpg",
+              EncodeJpeg(Photo(96, 64, static_cast<uint64_t>(i)), 90));
   const std::string copies = scratch_ / "copies";
   IngestResult result = Ingest();
   EXPECT_EQ(PhotosForColmap(result.photos, copies)[0].path, result.photos[0].path);
   EXPECT_FALSE(fs::exists(copies));
-  WriteBytes(folder_ + "/p1.jpg", EncodePng16(WidePhoto(1)));
+  WriteText(folder_ + "/p1.jpg", EncodePng16(WidePhoto(1)));
   result = Ingest();
   const std::vector<StagedPhoto> photos = PhotosForColmap(result.photos, copies);
   ASSERT_EQ(photos.size(), 3u);
   for (size_t i = 0; i < 3; ++i) {
     EXPECT_EQ(photos[i].name, result.photos[i].name);
     EXPECT_EQ(photos[i].path, copies + "/" + photos[i].name);
-    EXPECT_EQ(ReadBytes(photos[i].path), EncodePng8(ReadImage(result.photos[i].path)));
+    EXPECT_EQ(ReadText(photos[i].path), EncodePng8(ReadImage(result.photos[i].path)));
   }
 }
 

@@ -14,6 +14,7 @@
 #include "kernels/synthetic/synthetic_scene.h"
 #include "pipeline/synth/synth_grade.h"
 #include "tests/support/expect_error.h"
+#include "tests/support/pictures.h"
 #include "tests/support/record_error.h"
 
 namespace regrade {
@@ -41,13 +42,6 @@ Image Graded(SynthGrade grade) {
   ApplyGrade(grade, TableScene().scene, TableScene().camera, TableScene().view.depth, 1,
              &color);
   return color;
-}
-
-double MeanDifference(const Image& a, const Image& b) {
-  double sum = 0;
-  for (size_t i = 0; i < a.pixels.size(); ++i)
-    sum += std::abs(double{a.pixels[i]} - double{b.pixels[i]});
-  return sum / static_cast<double>(a.pixels.size());
 }
 
 std::string Said(const PhotoEdit& edit) {
@@ -81,7 +75,7 @@ TEST(PhotoEdit, ALocalGradeIsKeptInThePicture) {
   EXPECT_EQ(edit.vignette(1), 1);
   EXPECT_NE(Said(edit).find("depends on the place"), std::string::npos);
   // What is above the low-pass frequency is lost beside edges.
-  EXPECT_LE(MeanDifference(edit.picture, edited), 0.02);
+  EXPECT_LE(testing::MeanDifference(edit.picture, edited), 0.02);
 }
 
 TEST(PhotoEdit, H186_AVignetteIsLeftOutAndSaid) {
@@ -89,7 +83,7 @@ TEST(PhotoEdit, H186_AVignetteIsLeftOutAndSaid) {
   EXPECT_NEAR(edit.vignette(1), VignetteFactor(1), 0.03);
   EXPECT_NE(Said(edit).find("a vignette (-3"), std::string::npos) << Said(edit);
   EXPECT_FALSE(edit.IsLocal()) << edit.local;
-  const double moved = MeanDifference(edit.picture, Graded(SynthGrade::kGlobal));
+  const double moved = testing::MeanDifference(edit.picture, Graded(SynthGrade::kGlobal));
   EXPECT_LE(moved, testing::RecordBound("mean change of colours by a vignette",
                                         testing::Computed::kFloat, moved, 1.0 / 255));
 }
@@ -124,7 +118,7 @@ TEST(PhotoEdit, H187_SharpeningAndGrainAreLeftOutAndSaid) {
   // Where few pixels share a colour the map keeps some of a grain of 7 of 255.
   for (const PhotoEdit* edit : {&sharpened, &grained}) {
     EXPECT_FALSE(edit->IsLocal()) << edit->local;
-    EXPECT_LE(MeanDifference(edit->picture, photo), 3.0 / 255);
+    EXPECT_LE(testing::MeanDifference(edit->picture, photo), 3.0 / 255);
   }
 }
 

@@ -13,6 +13,7 @@
 #include "pipeline/capture/ingest_photos.h"
 #include "pipeline/files/atomic_file.h"
 #include "tests/pipeline/picture_corpus.h"
+#include "tests/support/expect_error.h"
 
 // Every read of this program comes by here: while this is set, drives are gone.
 static std::atomic<bool> drive_is_gone = false;
@@ -30,17 +31,16 @@ namespace fs = std::filesystem;
 using testing::Contains;
 using testing::ExifBlock;
 using testing::Photo;
-using testing::ReadBytes;
-using testing::ScratchFolder;
+using testing::TemporaryFolder;
 using testing::WithSegment;
-using testing::WriteBytes;
+using testing::WriteText;
 
 class PhotoFolder : public ::testing::Test {
  protected:
   PhotoFolder() { fs::create_directory(folder_); }
 
   void PutPhoto(const std::string& name, uint64_t seed) {
-    WriteBytes(folder_ + "/" + name, EncodeJpeg(Photo(96, 64, seed), 90));
+    WriteText(folder_ + "/" + name, EncodeJpeg(Photo(96, 64, seed), 90));
   }
   void PutPhotos(int count) {
     for (int i = 0; i < count; ++i)
@@ -50,25 +50,15 @@ class PhotoFolder : public ::testing::Test {
     return IngestPhotos(folder_, staging_, options, {});
   }
   Error Failure() {
-    try {
-      Ingest();
-    } catch (const Error& error) {
-      return error;
-    }
-    return Error(ExitCode::kDone, "");
+    return testing::ErrorFrom([&] { Ingest(); });
   }
   static std::vector<std::string> Files(const IngestResult& result) {
     std::vector<std::string> files;
     for (const StagedPhoto& photo : result.photos) files.push_back(photo.file);
     return files;
   }
-  static std::string WhyNot(const IngestResult& result, const std::string& file) {
-    for (const PhotoStatus& photo : result.statuses)
-      if (photo.file == file) return photo.status == PhotoState::kUsed ? "used" : photo.why;
-    return "not listed";
-  }
 
-  ScratchFolder scratch_;
+  TemporaryFolder scratch_;
   std::string folder_ = scratch_ / "photos", staging_ = scratch_ / "out/poses/photos";
 };
 
@@ -135,20 +125,19 @@ TEST_F(PhotoFolder, StagesInNaturalOrder) {
 TEST_F(PhotoFolder, BadFilesAreNamedAndLeftOut) {
   PutPhotos(3);
   const std::string jpeg = EncodeJpeg(Photo(96, 64, 50), 90);
-  WriteBytes(folder_ + "/cut.jpg", jpeg.substr(0, jpeg.size() / 2));
-  WriteBytes(folder_ + "/empty.jpg", "");
-  WriteBytes(folder_ + "/notes.txt", "shot on a rainy day");
-  WriteBytes(folder_ + "/tiny.png", EncodePng8(Photo(16, 16, 1)));
+  WriteText(folder_ + "/cut.jpg", jpeg.substr(0, jpeg.size() / 2));
+  WriteText(folder_ + "/empty.jpg", "");
+  WriteText(folder_ + "/notes.txt", "shot on a rainy day");
+  WriteText(folder_ + "/tiny.png", EncodePng8(Photo(16, 16, 1)));
   const IngestResult result = Ingest();
   EXPECT_EQ(result.photos.size(), 3u);
   EXPECT_EQ(result.statuses.size(), 7u);
-  EXPECT_TRUE(Contains(WhyNot(result, "cut.jpg"), "damaged JPEG"));
-  EXPECT_EQ(WhyNot(result, "empty.jpg"), "empty file");
-  EXPECT_EQ(WhyNot(result, "notes.txt"), "not an image");
-  EXPECT_TRUE(Contains(WhyNot(result, "tiny.png"), "less than 64"));
+  EXPECT_TRUE(Contains(testing::WhyNot(result, "cut.jpg"), "damaged JPEG"));
+  EXPECT_EQ(testing::WhyNot(result, "empty.jpg"), "empty file");
+  EXPECT_EQ(testing::WhyNot(result, "notes.txt"), "not an image");
+  EXPECT_TRUE(Contains(testing::WhyNot(result, "tiny.png"), "less than 64"));
   EXPECT_EQ(result.notices.size(), 3u) << "what never was a photo is left out quietly";
-  IngestOptions options;
-  options.accept_damaged = true;
+  IngestOptions options{.accept_damaged = true};
   EXPECT_EQ(Ingest(options).photos.size(), 4u);
 }
 
@@ -164,8 +153,8 @@ TEST_F(PhotoFolder, F8_PipesSocketsAndFoldersNeverBlock) {
   const IngestResult result = Ingest();
   ::close(fd);
   EXPECT_EQ(result.photos.size(), 3u);
-  EXPECT_TRUE(Contains(WhyNot(result, "pipe.jpg"), "a named pipe"));
-  EXPECT_TRUE(Contains(WhyNot(result, "s.jpg"), "a socket"));
+  EXPECT_TRUE(Contains(testing::WhyNot(result, "pipe.jpg"), "a named pipe"));
+  EXPECT_TRUE(Contains(testing::WhyNot(result, "s.jpg"), "a socket"));
 }
 
 TEST_F(PhotoFolder, F9_LinksNeitherLoopNorLeadOut) {
@@ -173,17 +162,17 @@ TEST_F(PhotoFolder, F9_LinksNeitherLoopNorLeadOut) {
   fs::create_directory(folder_ + "/sub");
   fs::create_directory_symlink("..", folder_ + "/sub/up");
   fs::create_symlink("self.jpg", folder_ + "/self.jpg");
-  WriteBytes(scratch_ / "photos2/secret.jpg", EncodeJpeg(Photo(96, 64, 99), 90));
+  WriteText(scratch_ / "photos2/secret.jpg", EncodeJpeg(Photo(96, 64, 99), 90));
   fs::create_symlink(scratch_ / "photos2/secret.jpg", folder_ + "/secret.jpg");
   fs::create_directory_symlink(scratch_ / "photos2", folder_ + "/elsewhere");
   fs::create_symlink("p1.jpg", folder_ + "/q.jpg");
   const IngestResult result = Ingest();
   EXPECT_EQ(Files(result), (std::vector<std::string>{"p0.jpg", "p1.jpg", "p2.jpg"}));
-  EXPECT_TRUE(Contains(WhyNot(result, "self.jpg"), "broken link"));
-  EXPECT_TRUE(Contains(WhyNot(result, "secret.jpg"), "leads out"));
-  EXPECT_TRUE(Contains(WhyNot(result, "elsewhere"), "leads out"));
-  EXPECT_TRUE(Contains(WhyNot(result, "sub/up"), "link to a folder"));
-  EXPECT_EQ(WhyNot(result, "q.jpg"), "the same picture as p1.jpg");
+  EXPECT_TRUE(Contains(testing::WhyNot(result, "self.jpg"), "broken link"));
+  EXPECT_TRUE(Contains(testing::WhyNot(result, "secret.jpg"), "leads out"));
+  EXPECT_TRUE(Contains(testing::WhyNot(result, "elsewhere"), "leads out"));
+  EXPECT_TRUE(Contains(testing::WhyNot(result, "sub/up"), "link to a folder"));
+  EXPECT_EQ(testing::WhyNot(result, "q.jpg"), "the same picture as p1.jpg");
 }
 
 TEST_F(PhotoFolder, F9_ALinkToTheFolderItselfIsFine) {
@@ -197,9 +186,9 @@ TEST_F(PhotoFolder, F10_BrokenLinksAndUnreadableFiles) {
   fs::create_symlink("gone.jpg", folder_ + "/broken.jpg");
   ASSERT_EQ(::chmod((folder_ + "/p3.jpg").c_str(), 0), 0);
   const IngestResult result = Ingest();
-  EXPECT_TRUE(Contains(WhyNot(result, "broken.jpg"), "No such file"));
+  EXPECT_TRUE(Contains(testing::WhyNot(result, "broken.jpg"), "No such file"));
   if (::geteuid() != 0) {  // root reads everything
-    EXPECT_TRUE(Contains(WhyNot(result, "p3.jpg"), "Permission denied"));
+    EXPECT_TRUE(Contains(testing::WhyNot(result, "p3.jpg"), "Permission denied"));
   }
 }
 
@@ -210,7 +199,7 @@ TEST_F(PhotoFolder, F11_OddNamesWork) {
   for (size_t i = 0; i < names.size(); ++i) PutPhoto(names[i], i);
   const IngestResult result = Ingest();
   EXPECT_EQ(result.photos.size(), names.size());
-  for (const std::string& name : names) EXPECT_EQ(WhyNot(result, name), "used");
+  for (const std::string& name : names) EXPECT_EQ(testing::WhyNot(result, name), "used");
 }
 
 TEST_F(PhotoFolder, F12_NamesThatDifferInCaseAreKeptApart) {
@@ -225,29 +214,24 @@ TEST_F(PhotoFolder, H126_DuplicatesNameTheirTwin) {
   WritePng8(folder_ + "/z copy.png", DecodePhoto(folder_ + "/p1.jpg").image);
   const IngestResult result = Ingest();
   EXPECT_EQ(result.photos.size(), 3u);
-  EXPECT_EQ(WhyNot(result, "z copy.png"), "the same picture as p1.jpg");
+  EXPECT_EQ(testing::WhyNot(result, "z copy.png"), "the same picture as p1.jpg");
 }
 
 TEST_F(PhotoFolder, F13_MissingFileEmptyOrWithoutPhotos) {
   const Error empty = Failure();
   EXPECT_EQ(empty.code(), ExitCode::kInput);
   EXPECT_TRUE(Contains(empty.what_failed(), "empty"));
-  WriteBytes(folder_ + "/a.txt", "text");
-  WriteBytes(folder_ + "/b.txt", "text");
-  WriteBytes(folder_ + "/c.jxl", std::string("\xff\x0a....", 6));
+  WriteText(folder_ + "/a.txt", "text");
+  WriteText(folder_ + "/b.txt", "text");
+  WriteText(folder_ + "/c.jxl", std::string("\xff\x0a....", 6));
   const Error none = Failure();
   EXPECT_EQ(none.code(), ExitCode::kInput);
   EXPECT_TRUE(Contains(none.what_failed(), "3 files, no usable photo")) << none.what();
   EXPECT_TRUE(Contains(none.what_failed(), "2 x not an image")) << none.what();
   EXPECT_TRUE(Contains(none.what_failed(), "JPEG XL is not supported")) << none.what();
   for (const char* bad : {"none", "photos/a.txt"}) {
-    try {
-      IngestPhotos(scratch_ / bad, staging_, {}, {});
-      FAIL();
-    } catch (const Error& error) {
-      EXPECT_EQ(error.code(), ExitCode::kInput);
-      EXPECT_TRUE(Contains(error.what_failed(), bad[0] == 'n' ? "no such folder" : "a file"));
-    }
+    EXPECT_REGRADE_ERROR(IngestPhotos(scratch_ / bad, staging_, {}, {}), ExitCode::kInput,
+                         bad[0] == 'n' ? "no such folder" : "a file");
   }
 }
 
@@ -287,8 +271,8 @@ TEST_F(PhotoFolder, H146_AlphaIsCompositedOnWhiteAndStaged) {
 
 TEST_F(PhotoFolder, H141_StagedPhotosAreUprightWithTheirFocalLength) {
   PutPhotos(3);
-  WriteBytes(folder_ + "/q.jpg",
-             WithSegment(EncodeJpeg(Photo(96, 64, 7), 90), 0xe1, ExifBlock(6, 28)));
+  WriteText(folder_ + "/q.jpg",
+            WithSegment(EncodeJpeg(Photo(96, 64, 7), 90), 0xe1, ExifBlock(6, 28)));
   const StagedPhoto photo = Ingest().photos[3];
   EXPECT_EQ(photo.width, 64);
   EXPECT_EQ(photo.height, 96);
@@ -303,7 +287,7 @@ TEST_F(PhotoFolder, AnotherCallRewritesOnlyWhatChanged) {
   for (const StagedPhoto& photo : first.photos) fs::last_write_time(photo.path, long_ago);
   PutPhoto("p2.jpg", 77);
   fs::remove(folder_ + "/p3.jpg");
-  WriteBytes(staging_ + "/notes.txt", "not ours");
+  WriteText(staging_ + "/notes.txt", "not ours");
   const IngestResult second = Ingest();
   EXPECT_EQ(fs::last_write_time(staging_ + "/00001.png"), long_ago);
   EXPECT_NE(fs::last_write_time(staging_ + "/00002.png"), long_ago);
@@ -350,7 +334,7 @@ TEST_F(PhotoFolder, F14_AVanishedDriveIsNotADamagedPhoto) {
 
 TEST_F(PhotoFolder, F14_ThousandsOfOtherFiles) {
   PutPhotos(3);
-  for (int i = 0; i < 3000; ++i) WriteBytes(folder_ + "/log/" + std::to_string(i), "x");
+  for (int i = 0; i < 3000; ++i) WriteText(folder_ + "/log/" + std::to_string(i), "x");
   const IngestResult result = Ingest();
   EXPECT_EQ(result.photos.size(), 3u);
   EXPECT_EQ(result.statuses.size(), 3003u);

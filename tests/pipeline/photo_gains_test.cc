@@ -32,21 +32,13 @@ constexpr uint64_t kSeed = 4;
 
 class SyntheticExposure : public ::testing::Test {
  protected:
-  void SetUp() override {
-    folder_ = fs::path(::testing::TempDir()) /
-              ("exposure_" +
-               std::string(::testing::UnitTest::GetInstance()->current_test_info()->name()));
-    fs::create_directories(folder_);
-  }
-  void TearDown() override { fs::remove_all(folder_); }
-
   Capture MakeCapture(bool exposure) {
     testing::SyntheticPhotos photos{.views = kViews, .seed = kSeed};
     photos.effects.exposure = exposure;
-    return testing::MakeSyntheticPhotos(photos, folder_.string());
+    return testing::MakeSyntheticPhotos(photos, folder_.path());
   }
 
-  fs::path folder_;
+  const testing::TemporaryFolder folder_;
 };
 
 TEST_F(SyntheticExposure, GainsOfTheSimulationAreFoundWithinTwoPercent) {
@@ -186,10 +178,8 @@ TEST(PhotoGains, H155_AsTakenIsBitForBit) {
 }
 
 TEST(PhotoGains, AreStoredBesideThePoses) {
-  const fs::path folder = fs::path(::testing::TempDir()) / "photo_gains_record";
-  fs::remove_all(folder);
-  fs::create_directories(folder);
-  const std::string poses = folder.string(), file = poses + "/exposure.json";
+  const testing::TemporaryFolder folder;
+  const std::string poses = folder.path(), file = poses + "/exposure.json";
   Capture capture;
   capture.views.resize(2);
   capture.views[0].file = "a.jpg", capture.views[1].file = "b.jpg";
@@ -216,7 +206,6 @@ TEST(PhotoGains, AreStoredBesideThePoses) {
   EXPECT_REGRADE_ERROR(ReadGains(poses, capture), ExitCode::kInput, "schema 1");
   WriteGains(poses, capture, estimate, {});
   EXPECT_FALSE(fs::exists(file));
-  fs::remove_all(folder);
 }
 
 // Every other photo has 0.4 of the light. With --keep-exposure so have its frames, and what
@@ -234,10 +223,9 @@ TEST(KeepExposure, WhatFramesAreComparedWithHasTheirExposures) {
     ApplyGain(0.4, &photo);
     WritePng8(path, photo);
   }
-  const auto run = [](std::vector<std::string> words, const std::vector<std::string>& more) {
-    words.insert(words.end(), more.begin(), more.end());
-    const testing::ProgramOutcome done = testing::RunProgram(REGRADE_PROGRAM, words);
-    ASSERT_EQ(done.code, 0) << done.text;
+  const auto run = [](const std::vector<std::string>& words,
+                      const std::vector<std::string>& more) {
+    testing::Said(testing::Joined(words, more));
   };
   run({"run",        folder / "s",
        "--style",    testing::SourceDir() + "/assets/style_sunset.png",

@@ -3,39 +3,26 @@
 #include <gtest/gtest.h>
 
 #include <filesystem>
-#include <fstream>
-#include <sstream>
 
 #include "evaluate/image_quality.h"
-#include "kernels/process/child_process.h"
 #include "pipeline/capture/capture_store.h"
 #include "pipeline/capture/working_views.h"
 #include "pipeline/files/json_file.h"
 #include "pipeline/images/image_file.h"
 #include "pipeline/workspace/output_names.h"
 #include "tests/support/nightly.h"
+#include "tests/support/run_program.h"
 #include "tests/support/temporary_folder.h"
 
 namespace regrade {
 namespace {
 
 namespace fs = std::filesystem;
+using testing::ReadText;
+using testing::Said;
 using testing::TemporaryFolder;
 
 constexpr int kMaskedViews = 17, kWidth = 160, kHeight = 120, kThing = 60;
-
-// Its output; it has to end with `exit_code`.
-std::string Said(std::vector<std::string> arguments, int exit_code = 0) {
-  ChildOptions options;
-  options.argv = {REGRADE_PROGRAM};
-  options.argv.insert(options.argv.end(), arguments.begin(), arguments.end());
-  options.wall_limit_s = 240;
-  std::string output;
-  const ChildResult result =
-      RunChild(options, [&output](const std::string& line) { output += line + "\n"; });
-  EXPECT_EQ(result.exit_status, exit_code) << output;
-  return output;
-}
 
 // A synthetic capture with its poses; in a copy of it a magenta square stands before all photos
 // but the last, somewhere else in each, and masks have it.
@@ -62,11 +49,9 @@ void SynthWithAThing(const TemporaryFolder& folder) {
 
 void Reconstruct(const std::string& capture, const std::string& out, const std::string& steps,
                  std::vector<std::string> more) {
-  std::vector<std::string> words = {"reconstruct",   capture, "--out",    out,
-                                    "--tracks",      "given", "--splats", "4",
-                                    "--splat-steps", steps};
-  words.insert(words.end(), more.begin(), more.end());
-  Said(words);
+  Said(testing::Joined({"reconstruct", capture, "--out", out, "--tracks", "given", "--splats",
+                        "4", "--splat-steps", steps},
+                       more));
 }
 
 double HeldOutPsnr(const std::string& out) {
@@ -74,13 +59,6 @@ double HeldOutPsnr(const std::string& out) {
       .At("metrics")
       .At("psnr_heldout_db")
       .AsDouble();
-}
-
-std::string Bytes(const std::string& path) {
-  std::ifstream file(path, std::ios::binary);
-  std::ostringstream bytes;
-  bytes << file.rdbuf();
-  return bytes.str();
 }
 
 TEST(PhotoMasks, MaskedPixelsAreNeitherFittedNorMeasured) {
@@ -142,7 +120,7 @@ TEST(PhotoMasks, LaterStagesAndRunsUseTheStagedMasks) {
     fs::copy(folder / "out", out, fs::copy_options::recursive);
     Said({"stylize", out, "--style", folder / "s/images/00016.png", "--method",
           "folder:" + styled, "--style-steps", "4", "--path", "views"});
-    networks[k] = Bytes(out + "/styles/00016/network.npz");
+    networks[k] = ReadText(out + "/styles/00016/network.npz");
     psnr[k] = ReadJsonFile(out + "/styles/00016/report.json")
                   .At("stages")
                   .At("evaluate")

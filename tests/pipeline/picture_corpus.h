@@ -1,15 +1,11 @@
-// Pictures and files made by tests: textured photos, EXIF blocks, scratch folders.
+// Pictures and files made by tests: textured photos, EXIF blocks.
 #pragma once
 
 #include <gtest/gtest.h>
-#include <stdlib.h>
 
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <filesystem>
-#include <fstream>
-#include <iterator>
 #include <map>
 #include <string>
 #include <utility>
@@ -18,42 +14,13 @@
 #include "kernels/base/error.h"
 #include "kernels/base/random.h"
 #include "kernels/scene/image.h"
+#include "pipeline/capture/ingest_photos.h"
 #include "pipeline/images/image_file.h"
+#include "tests/support/pictures.h"
 #include "tests/support/record_error.h"
+#include "tests/support/temporary_folder.h"
 
 namespace regrade::testing {
-
-class ScratchFolder {
- public:
-  ScratchFolder() {
-    std::string name =
-        (std::filesystem::temp_directory_path() / "regrade-test-XXXXXX").string();
-    path_ = ::mkdtemp(name.data());
-  }
-  ~ScratchFolder() {
-    std::error_code ignored;
-    std::filesystem::remove_all(path_, ignored);
-  }
-  ScratchFolder(const ScratchFolder&) = delete;
-  ScratchFolder& operator=(const ScratchFolder&) = delete;
-  const std::string& path() const { return path_; }
-  std::string operator/(const std::string& name) const { return path_ + "/" + name; }
-
- private:
-  std::string path_;
-};
-
-inline void WriteBytes(const std::string& path, const std::string& bytes) {
-  std::filesystem::create_directories(std::filesystem::path(path).parent_path());
-  std::ofstream file(path, std::ios::binary);
-  file << bytes;
-  ASSERT_TRUE(file.good()) << path;
-}
-
-inline std::string ReadBytes(const std::string& path) {
-  std::ifstream file(path, std::ios::binary);
-  return {std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
-}
 
 // Smooth waves with some grain, different for each seed, values on the 8-bit grid.
 inline Image Photo(int width, int height, uint64_t seed, int channels = 3) {
@@ -185,36 +152,21 @@ inline std::string Refusal(const std::string& path, const DecodeLimits& limits =
   }
 }
 
-inline bool Contains(const std::string& text, const std::string& part) {
-  return text.find(part) != std::string::npos;
-}
-
-inline double MaxDifference(const Image& a, const Image& b) {
-  EXPECT_TRUE(a.SameSize(b) && a.channels == b.channels);
-  if (a.pixels.size() != b.pixels.size()) return 1e9;
-  double worst = 0;
-  for (size_t i = 0; i < a.pixels.size(); ++i)
-    worst = std::max(worst, std::abs(static_cast<double>(a.pixels[i]) - b.pixels[i]));
-  return worst;
-}
-
-inline double MeanDifference(const Image& a, const Image& b) {
-  EXPECT_TRUE(a.SameSize(b) && a.channels == b.channels);
-  if (a.pixels.size() != b.pixels.size()) return 1e9;
-  double sum = 0;
-  for (size_t i = 0; i < a.pixels.size(); ++i)
-    sum += std::abs(static_cast<double>(a.pixels[i]) - b.pixels[i]);
-  return sum / static_cast<double>(a.pixels.size());
-}
-
 // A test with a scratch folder.
 class PictureTest : public ::testing::Test {
  protected:
   std::string Put(const std::string& name, const std::string& bytes) {
-    WriteBytes(scratch_ / name, bytes);
+    WriteText(scratch_ / name, bytes);
     return scratch_ / name;
   }
-  ScratchFolder scratch_;
+  TemporaryFolder scratch_;
 };
+
+// Why a photo is not used.
+inline std::string WhyNot(const IngestResult& result, const std::string& file) {
+  for (const PhotoStatus& photo : result.statuses)
+    if (photo.file == file) return photo.status == PhotoState::kUsed ? "used" : photo.why;
+  return "not listed";
+}
 
 }  // namespace regrade::testing

@@ -7,8 +7,6 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
-#include <fstream>
-#include <sstream>
 
 #include "kernels/base/error.h"
 #include "kernels/process/child_process.h"
@@ -18,68 +16,43 @@
 #include "pipeline/images/image_file.h"
 #include "pipeline/synth/synth_effects.h"
 #include "reconstruct/colmap/colmap_model.h"
+#include "tests/support/run_program.h"
 #include "tests/support/temporary_folder.h"
 
 namespace regrade {
 namespace {
 
 namespace fs = std::filesystem;
+using testing::ReadText;
+using testing::Said;
 using testing::TemporaryFolder;
 
 constexpr int kViews = 12;
-
-bool HaveColmap() {
-  try {
-    return RunChild({.argv = {"colmap", "help"}}).Succeeded();
-  } catch (const Error&) {
-    return false;
-  }
-}
-
-// Its output; it must succeed.
-std::string Regrade(std::vector<std::string> arguments) {
-  ChildOptions options;
-  options.argv = {REGRADE_PROGRAM};
-  options.argv.insert(options.argv.end(), arguments.begin(), arguments.end());
-  options.wall_limit_s = 240;
-  std::string output;
-  const ChildResult result =
-      RunChild(options, [&output](const std::string& line) { output += line + "\n"; });
-  EXPECT_TRUE(result.Succeeded()) << output;
-  return output;
-}
 
 void Synth(const std::string& out, const std::string& effects) {
   std::vector<std::string> words = {"synth",  out,      "--views", std::to_string(kViews),
                                     "--size", "280x210"};
   if (!effects.empty()) words.insert(words.end(), {"--effects", effects});
-  Regrade(words);
+  Said(words);
 }
 
 JsonValue PoseMetrics(const std::string& out) {
   return ReadJsonFile(out + "/.regrade/stages/pose.json").At("metrics");
 }
 
-std::string Bytes(const std::string& path) {
-  std::ifstream file(path, std::ios::binary);
-  std::ostringstream bytes;
-  bytes << file.rdbuf();
-  return bytes.str();
-}
-
 TEST(PoseTracks, WithoutColmapResultsAreThoseWithoutTracks) {
   const TemporaryFolder folder;
   Synth(folder / "s", "");
-  Regrade({"pose", folder / "s/truth", "--out", folder / "given", "--tracks", "given"});
-  const std::string output = Regrade({"pose", folder / "s/truth", "--out", folder / "none",
-                                      "--colmap", folder / "no-such-colmap"});
+  Said({"pose", folder / "s/truth", "--out", folder / "given", "--tracks", "given"});
+  const std::string output = Said({"pose", folder / "s/truth", "--out", folder / "none",
+                                   "--colmap", folder / "no-such-colmap"});
   EXPECT_NE(output.find("COLMAP found no tracks"), std::string::npos) << output;
   for (const char* name : {"cameras.bin", "images.bin", "points3D.bin"})
-    EXPECT_EQ(Bytes(folder / (std::string("given/poses/sparse/") + name)),
-              Bytes(folder / (std::string("none/poses/sparse/") + name)))
+    EXPECT_EQ(ReadText(folder / (std::string("given/poses/sparse/") + name)),
+              ReadText(folder / (std::string("none/poses/sparse/") + name)))
         << name;
-  EXPECT_EQ(Bytes(folder / "given/poses/photos.json"),
-            Bytes(folder / "none/poses/photos.json"));
+  EXPECT_EQ(ReadText(folder / "given/poses/photos.json"),
+            ReadText(folder / "none/poses/photos.json"));
   EXPECT_EQ(PoseMetrics(folder / "given").Find("tracks"), nullptr);
 }
 
@@ -104,10 +77,10 @@ TEST(PoseTracks, NotForTransparentPhotosOrGivenPoints) {
 
 // A drift of +-30 %, poses in a transforms.json, no points.
 TEST(PoseTracks, ExposureOfGivenPosesIsFoundWithinTwoPerCent) {
-  if (!HaveColmap()) GTEST_SKIP() << "no colmap here";
+  if (!testing::HaveColmap()) GTEST_SKIP() << "no colmap here";
   const TemporaryFolder folder;
   Synth(folder / "s", "exposure");
-  Regrade({"pose", folder / "s/truth", "--out", folder / "out"});
+  Said({"pose", folder / "s/truth", "--out", folder / "out"});
   const Capture capture = ReadCapture(folder / "out/poses");
   ASSERT_EQ(capture.views.size(), static_cast<size_t>(kViews));
   const SceneProfile profile = ProfileScene(capture, 2, "auto");
@@ -129,7 +102,7 @@ TEST(PoseTracks, ExposureOfGivenPosesIsFoundWithinTwoPerCent) {
 
 // Poses of the right photos in the wrong order: COLMAP finds points for them, by chance.
 TEST(PoseTracks, PosesOfOtherPhotosAreRejected) {
-  if (!HaveColmap()) GTEST_SKIP() << "no colmap here";
+  if (!testing::HaveColmap()) GTEST_SKIP() << "no colmap here";
   const TemporaryFolder folder;
   Synth(folder / "s", "");
   const std::string path = folder / "s/truth/transforms.json";
@@ -141,7 +114,7 @@ TEST(PoseTracks, PosesOfOtherPhotosAreRejected) {
     frames[i]["transform_matrix"] = poses[(5 * i + 3) % poses.size()];
   json["frames"] = frames;
   WriteJsonFile(path, json);
-  const std::string output = Regrade({"pose", folder / "s/truth", "--out", folder / "out"});
+  const std::string output = Said({"pose", folder / "s/truth", "--out", folder / "out"});
   EXPECT_NE(output.find("poses of other photos"), std::string::npos) << output;
   EXPECT_TRUE(ReadCapture(folder / "out/poses").points.empty());
 }
@@ -149,7 +122,7 @@ TEST(PoseTracks, PosesOfOtherPhotosAreRejected) {
 // Masks by the names of photos, with their extension or without, of half the size: what they
 // blacken is not matched.
 TEST(PoseTracks, MaskedPixelsAreNotMatched) {
-  if (!HaveColmap()) GTEST_SKIP() << "no colmap here";
+  if (!testing::HaveColmap()) GTEST_SKIP() << "no colmap here";
   const TemporaryFolder folder;
   Synth(folder / "s", "");
   fs::create_directories(folder / "masks");
@@ -161,7 +134,7 @@ TEST(PoseTracks, MaskedPixelsAreNotMatched) {
     std::snprintf(name, sizeof name, i % 2 ? "%05d.png" : "%05d.png.png", i);
     WritePng8(folder / ("masks/" + std::string(name)), mask);
   }
-  Regrade(
+  Said(
       {"pose", folder / "s/truth", "--out", folder / "out", "--photo-masks", folder / "masks"});
   const ColmapModel model = ReadColmapModel(folder / "out/poses/sparse");
   ASSERT_GE(model.points.size(), kFewestTracks);
@@ -188,15 +161,15 @@ TEST(PoseTracks, MaskedPixelsAreNotMatched) {
 
 // Poses 0.3 degrees and 0.5 % of the spread off, handed over without their tracks.
 TEST(PoseTracks, PerturbedPosesAreRefined) {
-  if (!HaveColmap()) GTEST_SKIP() << "no colmap here";
+  if (!testing::HaveColmap()) GTEST_SKIP() << "no colmap here";
   const TemporaryFolder folder;
   Synth(folder / "s", "poses");
-  Regrade({"pose", folder / "s", "--out", folder / "off", "--effects", "pose-refinement=off"});
-  Regrade({"export", folder / "off", "--format", "transforms", "--out", folder / "shaken"});
+  Said({"pose", folder / "s", "--out", folder / "off", "--effects", "pose-refinement=off"});
+  Said({"export", folder / "off", "--format", "transforms", "--out", folder / "shaken"});
   const std::string output =
-      Regrade({"pose", folder / "shaken", "--out", folder / "out", "--verbose"});
+      Said({"pose", folder / "shaken", "--out", folder / "out", "--verbose"});
   ASSERT_NE(output.find("pose-refinement on"), std::string::npos) << output;
-  Regrade({"pose", folder / "s/truth", "--out", folder / "truth", "--tracks", "given"});
+  Said({"pose", folder / "s/truth", "--out", folder / "truth", "--tracks", "given"});
   const Capture truth = ReadCapture(folder / "truth/poses"),
                 before = ReadCapture(folder / "off/poses"),
                 after = ReadCapture(folder / "out/poses");

@@ -16,56 +16,35 @@
 #include "pipeline/images/video_writer.h"
 #include "pipeline/program/interrupt.h"
 #include "pipeline/workspace/workspace.h"
+#include "tests/support/run_program.h"
 #include "tests/support/source_dir.h"
 #include "tests/support/temporary_folder.h"
 
 namespace regrade {
 namespace {
 
+using testing::ProgramOutcome;
+using testing::Regrade;
+using testing::RunProgram;
 using testing::TemporaryFolder;
 using testing::WriteText;
-
-struct Outcome {
-  int code = 0;
-  std::string text;
-};
-
-Outcome RunProgram(std::vector<std::string> command,
-                   const std::vector<std::string>& arguments) {
-  ChildOptions options;
-  options.argv = std::move(command);
-  options.argv.insert(options.argv.end(), arguments.begin(), arguments.end());
-  options.wall_limit_s = 120;
-  Outcome outcome;
-  const ChildResult result =
-      RunChild(options, [&outcome](const std::string& line) { outcome.text += line + "\n"; });
-  outcome.code = result.end == ChildEnd::kExited ? result.exit_status : 128 + result.signal;
-  return outcome;
-}
-
-Outcome Regrade(const std::vector<std::string>& arguments) {
-  return RunProgram({REGRADE_PROGRAM}, arguments);
-}
-
-#define EXPECT_SAYS(outcome, part) \
-  EXPECT_NE(outcome.text.find(part), std::string::npos) << outcome.text
 
 TEST(Program, HelpAndVersion) {
   for (const auto& arguments :
        std::vector<std::vector<std::string>>{{}, {"help"}, {"--help"}, {"-h"}}) {
-    const Outcome outcome = Regrade(arguments);
+    const ProgramOutcome outcome = Regrade(arguments);
     EXPECT_EQ(outcome.code, 0);
     EXPECT_SAYS(outcome, "reconstruct");
     EXPECT_SAYS(outcome, "tradeoff");
   }
   EXPECT_SAYS(Regrade({"--version"}), "regrade 0.");
-  const Outcome help = Regrade({"run", "--help"});
+  const ProgramOutcome help = Regrade({"run", "--help"});
   EXPECT_EQ(help.code, 0);
   EXPECT_SAYS(help, "--film-seconds");
   EXPECT_EQ(help.text.find("--photo-size"), std::string::npos);
   EXPECT_LE(std::ranges::count(help.text, '\n'), 45);
   EXPECT_LE(std::ranges::count(Regrade({}).text, '\n'), 45);
-  const Outcome all = Regrade({"run", "--help-all"});
+  const ProgramOutcome all = Regrade({"run", "--help-all"});
   EXPECT_SAYS(all, "--photo-size");
   EXPECT_SAYS(all, "default 800");
   EXPECT_SAYS(all, "--no-NAME");
@@ -75,7 +54,8 @@ TEST(Program, HelpAndVersion) {
 
 // A command's own options are in its short help, and those that it ignores are not.
 TEST(Program, HelpShowsTheOptionsOfTheCommand) {
-  const Outcome retouch = Regrade({"retouch", "--help"}), pose = Regrade({"pose", "--help"});
+  const ProgramOutcome retouch = Regrade({"retouch", "--help"}),
+                       pose = Regrade({"pose", "--help"});
   for (const char* part : {"--photo ", "--edited", "--from", "--keep-vignette"})
     EXPECT_SAYS(retouch, part);
   EXPECT_EQ(retouch.text.find("--masks"), std::string::npos);
@@ -88,7 +68,7 @@ TEST(Program, HelpShowsTheOptionsOfTheCommand) {
 
 // Both are written from the table of options.
 TEST(Program, ManPageAndCompletionHaveEveryCommandAndOption) {
-  const Outcome man = Regrade({"manual"}), bash = Regrade({"manual", "--bash"});
+  const ProgramOutcome man = Regrade({"manual"}), bash = Regrade({"manual", "--bash"});
   EXPECT_EQ(man.code, 0);
   EXPECT_EQ(bash.code, 0);
   for (const char* part : {".TH REGRADE 1", "regrade contact", "photo\\-size", "film\\-seconds",
@@ -100,7 +80,7 @@ TEST(Program, ManPageAndCompletionHaveEveryCommandAndOption) {
 }
 
 TEST(Program, F18_UsageErrorsExitWith2) {
-  Outcome outcome = Regrade({"recontruct"});
+  ProgramOutcome outcome = Regrade({"recontruct"});
   EXPECT_EQ(outcome.code, 2);
   EXPECT_SAYS(outcome, "did you mean `regrade reconstruct`?");
   outcome = Regrade({"pose", "x", "--out", "y", "--treads", "2"});
@@ -128,9 +108,10 @@ TEST(Program, ADryRunListsTheStagesOfEachStyle) {
   const TemporaryFolder folder;
   ASSERT_EQ(Regrade({"synth", folder / "s", "--views", "5", "--size", "64x48"}).code, 0);
   const std::string assets = testing::SourceDir() + "/assets/style_";
-  const Outcome outcome = Regrade({"run", folder / "s/images", "--style", assets + "sunset.png",
-                                   "--style", assets + "night.png", "--out", folder / "o",
-                                   "--max-memory", "0.05", "--dry-run", "--json"});
+  const ProgramOutcome outcome =
+      Regrade({"run", folder / "s/images", "--style", assets + "sunset.png", "--style",
+               assets + "night.png", "--out", folder / "o", "--max-memory", "0.05", "--dry-run",
+               "--json"});
   EXPECT_EQ(outcome.code, 0) << outcome.text;
   const JsonValue plan = PlanIn(outcome.text);
   const JsonValue::Array& stages = plan.At("stages").AsArray();
@@ -143,7 +124,7 @@ TEST(Program, ADryRunListsTheStagesOfEachStyle) {
   EXPECT_EQ(stages[11].At("style").AsString(), "style_night");
   EXPECT_EQ(stages[11].At("stage").AsString(), "report");
   // The fit takes more than the limit.
-  EXPECT_NE(outcome.text.find("{\"event\":\"warning\""), std::string::npos) << outcome.text;
+  EXPECT_SAYS(outcome, "{\"event\":\"warning\"");
   EXPECT_FALSE(std::filesystem::exists(folder / "o"));
 }
 
@@ -151,7 +132,7 @@ TEST(Program, ADryRunListsTheStagesOfEachStyle) {
 TEST(Program, APlanOfANewFolderHasTheTimeOfTheFit) {
   const TemporaryFolder folder;
   ASSERT_EQ(Regrade({"synth", folder / "s", "--views", "5", "--size", "64x48"}).code, 0);
-  const Outcome outcome = Regrade(
+  const ProgramOutcome outcome = Regrade(
       {"reconstruct", folder / "s/images", "--out", folder / "o", "--dry-run", "--json"});
   EXPECT_EQ(outcome.code, 0) << outcome.text;
   const JsonValue plan = PlanIn(outcome.text);
@@ -168,7 +149,8 @@ TEST(Program, F90_FilmsArePlannedAndDamagedOnesExitWith3) {
   VideoWriter film(folder / "walk.mp4", 64, 48, 30);
   for (int i = 0; i < 45; ++i) film.Add(Image(64, 48));
   film.Finish();
-  Outcome outcome = Regrade({"pose", folder / "walk.mp4", "--out", folder / "o", "--dry-run"});
+  ProgramOutcome outcome =
+      Regrade({"pose", folder / "walk.mp4", "--out", folder / "o", "--dry-run"});
   EXPECT_EQ(outcome.code, 0) << outcome.text;
   EXPECT_SAYS(outcome, "1 film (1.5 s), of which 40 to 120 frames are picked in");
   EXPECT_FALSE(std::filesystem::exists(folder / "o"));
@@ -186,7 +168,8 @@ TEST(Program, F73_ProbesReadOneFileAndReport) {
   const TemporaryFolder folder;
   WriteText(folder / "diary.onnx", "Dear diary,");
   for (const char* kind : {"style", "pair"}) {
-    const Outcome outcome = Regrade({"--probe", "30000000000", kind, folder / "diary.onnx"});
+    const ProgramOutcome outcome =
+        Regrade({"--probe", "30000000000", kind, folder / "diary.onnx"});
     EXPECT_EQ(outcome.code, 4);
     EXPECT_SAYS(outcome, "diary.onnx");
   }
@@ -195,8 +178,8 @@ TEST(Program, F73_ProbesReadOneFileAndReport) {
 }
 
 TEST(Program, F21_ContradictionsNameBoth) {
-  const Outcome outcome = Regrade({"reconstruct", "x", "--out", "y", "--field", "voxels",
-                                   "--fit-resolutions", "32", "--fit-steps", "9,9"});
+  const ProgramOutcome outcome = Regrade({"reconstruct", "x", "--out", "y", "--field", "voxels",
+                                          "--fit-resolutions", "32", "--fit-steps", "9,9"});
   EXPECT_EQ(outcome.code, 2);
   EXPECT_SAYS(outcome, "--fit-resolutions");
   EXPECT_SAYS(outcome, "--fit-steps");
@@ -211,12 +194,12 @@ TEST(Program, TheStyleMethodIsCheckedBeforeAnyWork) {
                     "--method", method});
   };
   for (const char* method : {"wct2", "folder:", "command:restyle {input}"}) {
-    const Outcome outcome = run(method);
+    const ProgramOutcome outcome = run(method);
     EXPECT_EQ(outcome.code, 2) << method;
     EXPECT_SAYS(outcome, "--method");
   }
   for (const char* method : {"folder:/nowhere/styled", "onnx:/nowhere/styled"}) {
-    const Outcome outcome = run(method);
+    const ProgramOutcome outcome = run(method);
     EXPECT_EQ(outcome.code, 3) << method;
     EXPECT_SAYS(outcome, "/nowhere/styled");
   }
@@ -224,7 +207,7 @@ TEST(Program, TheStyleMethodIsCheckedBeforeAnyWork) {
   WriteText(folder / "letters/a.txt", "x");
   WriteText(folder / "broken/encoder.onnx", "not a network");
   for (const char* networks : {"letters", "broken"}) {
-    const Outcome outcome = run("onnx:" + (folder / networks));
+    const ProgramOutcome outcome = run("onnx:" + (folder / networks));
     EXPECT_EQ(outcome.code, 4) << networks;
     EXPECT_SAYS(outcome, folder / networks);
     EXPECT_SAYS(outcome, "encoder.onnx");
@@ -234,7 +217,7 @@ TEST(Program, TheStyleMethodIsCheckedBeforeAnyWork) {
 
 TEST(Program, F13_MissingFolderExitsWith3) {
   const TemporaryFolder folder;
-  const Outcome outcome = Regrade({"pose", folder / "none", "--out", folder / "out"});
+  const ProgramOutcome outcome = Regrade({"pose", folder / "none", "--out", folder / "out"});
   EXPECT_EQ(outcome.code, 3);
   EXPECT_SAYS(outcome, folder / "none");
   EXPECT_FALSE(std::filesystem::exists(folder / "out"));
@@ -246,7 +229,7 @@ TEST(Program, F16_StyleIsCheckedFirst) {
   const TemporaryFolder folder;
   WriteText(folder / "photos/a.png", "x");
   WriteText(folder / "style.jpg", "not a picture");
-  const Outcome outcome = Regrade(
+  const ProgramOutcome outcome = Regrade(
       {"run", folder / "photos", "--style", folder / "style.jpg", "--out", folder / "out"});
   EXPECT_EQ(outcome.code, 3);
   EXPECT_SAYS(outcome, "style.jpg");
@@ -257,40 +240,35 @@ TEST(Program, F38_LockedFolderExitsWith7) {
   const TemporaryFolder folder;
   WriteText(folder / "photos/a.png", "x");
   const Workspace workspace(folder / "out");
-  const Outcome outcome = Regrade({"pose", folder / "photos", "--out", folder / "out"});
+  const ProgramOutcome outcome = Regrade({"pose", folder / "photos", "--out", folder / "out"});
   EXPECT_EQ(outcome.code, 7);
   EXPECT_SAYS(outcome, std::to_string(::getpid()));
 }
 
-TEST(Program, F33_OutputThatIsAFileExitsWith5) {
-  const TemporaryFolder folder;
-  WriteText(folder / "photos/a.png", "x");
-  WriteText(folder / "out", "x");
-  EXPECT_EQ(Regrade({"pose", folder / "photos", "--out", folder / "out"}).code, 5);
-}
-
 // `regrade render` in a folder of a run, under limits that a shell sets.
-Outcome RenderUnder(const std::string& limits, const std::vector<std::string>& arguments) {
+ProgramOutcome RenderUnder(const std::string& limits,
+                           const std::vector<std::string>& arguments) {
   const TemporaryFolder folder;
   { const Workspace workspace(folder / "out"); }
   for (const char* run : {"out/run.json", "out/styles/style_sunset/run.json"})
     WriteText(folder / run, "{\"arguments\": [\"photos\"], \"options\": {\"style\": \"" +
                                 testing::SourceDir() + "/assets/style_sunset.png\"}}");
-  return RunProgram({"/bin/sh", "-c", limits + "; exec \"$0\" \"$@\"", REGRADE_PROGRAM,
-                     "render", folder / "out"},
-                    arguments);
+  std::vector<std::string> words{"-c", limits + "; exec \"$0\" \"$@\"", REGRADE_PROGRAM,
+                                 "render", folder / "out"};
+  words.insert(words.end(), arguments.begin(), arguments.end());
+  return RunProgram("/bin/sh", words);
 }
 
 // Standard streams and the lock take the four files that may be open.
 TEST(Program, F25_WithoutAFileLeftToListTheFolderExitsWith5) {
-  const Outcome outcome = RenderUnder("ulimit -n 4", {});
+  const ProgramOutcome outcome = RenderUnder("ulimit -n 4", {});
   EXPECT_EQ(outcome.code, 5) << outcome.text;
   EXPECT_SAYS(outcome, "Too many open files");
 }
 
 // Stacks of 8 MB: 4096 of them do not fit into 4 GB of address space.
 TEST(Program, F44_ThreadsThatCannotStartExitWith5) {
-  const Outcome outcome =
+  const ProgramOutcome outcome =
       RenderUnder("ulimit -s 8192; ulimit -v 4000000", {"--threads", "4096"});
   EXPECT_EQ(outcome.code, 5) << outcome.text;
   EXPECT_SAYS(outcome, "cannot start 4096 threads");
@@ -299,7 +277,7 @@ TEST(Program, F44_ThreadsThatCannotStartExitWith5) {
 TEST(Program, F22_ConfigErrorsNameTheLine) {
   const TemporaryFolder folder;
   WriteText(folder / "c.json", "{\"arguments\": [],\n \"options\": {\n  \"sed\": 1}}");
-  Outcome outcome = Regrade({"run", "x", "--config", folder / "c.json"});
+  ProgramOutcome outcome = Regrade({"run", "x", "--config", folder / "c.json"});
   EXPECT_EQ(outcome.code, 2);
   EXPECT_SAYS(outcome, "c.json:3:");
   EXPECT_SAYS(outcome, "\"seed\"");
@@ -318,27 +296,18 @@ TEST(Program, AStyleThatCannotBeUsedOrIsSteepIsSaidBeforeAnyWork) {
                     folder / "out", "--dry-run"});
   };
   WriteText(folder / "steep.cube", "LUT_1D_SIZE 2\n+0 0 0\n+61.7 1 1\n");
-  const Outcome steep = plan("steep.cube");
+  const ProgramOutcome steep = plan("steep.cube");
   EXPECT_EQ(steep.code, 0) << steep.text;
   EXPECT_SAYS(steep, "61.70 times");
   WriteText(folder / "half.png", "\x89PNG\r\n\x1a\n");
-  const Outcome half = plan("half.png");
+  const ProgramOutcome half = plan("half.png");
   EXPECT_EQ(half.code, 3) << half.text;
   EXPECT_SAYS(half, folder / "half.png");
 }
 
-TEST(Program, DryRunTouchesNothing) {
-  const TemporaryFolder folder;
-  WriteText(folder / "photos/a.png", "x");
-  const Outcome outcome =
-      Regrade({"pose", folder / "photos", "--out", folder / "out", "--dry-run"});
-  EXPECT_EQ(outcome.code, 0);
-  EXPECT_FALSE(std::filesystem::exists(folder / "out"));
-}
-
 TEST(Program, JsonLinesAreJson) {
   const TemporaryFolder folder;
-  const Outcome outcome =
+  const ProgramOutcome outcome =
       Regrade({"synth", folder / "s", "--views", "2", "--size", "64x48", "--json"});
   EXPECT_EQ(outcome.code, 0);
   int events = 0;

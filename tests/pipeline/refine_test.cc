@@ -28,16 +28,14 @@ class Refine : public ::testing::Test {
                                     "--seed",        "3",
                                     "--reproducible"};
     for (const std::string& flag : testing::TinyFlags("splats")) run.push_back(flag);
-    const ProgramOutcome made = Regrade(run);
-    ASSERT_EQ(made.code, 0) << made.text;
+    testing::Said(run);
   }
 
   ProgramOutcome RefineWith(const std::vector<std::string>& more,
                             const std::string& of = "o") const {
-    std::vector<std::string> words = {"refine",   folder_ / of, "--blocks",      "3",
-                                      "--splats", "4",          "--splat-steps", "90"};
-    words.insert(words.end(), more.begin(), more.end());
-    return Regrade(words);
+    return Regrade(
+        {"refine", folder_ / of, "--blocks", "3", "--splats", "4", "--splat-steps", "90"},
+        more);
   }
 
   JsonValue Refined(const std::string& of = "o") const {
@@ -75,10 +73,8 @@ TEST_F(Refine, PartsGiveTheBytesOfOneProcess) {
     EXPECT_EQ(RefineWith({again}, "p").code, 0) << again;
   EXPECT_EQ(ReadText(folder_ / "p/field.npz"), refined);
   // The stage counts as done, with the field that is there now.
-  const ProgramOutcome style =
-      Regrade({"reconstruct", folder_ / "capture/truth", "--out", folder_ / "p", "--config",
-               folder_ / "o/run.json", "--dry-run"});
-  EXPECT_EQ(style.code, 0) << style.text;
+  testing::Said({"reconstruct", folder_ / "capture/truth", "--out", folder_ / "p", "--config",
+                 folder_ / "o/run.json", "--dry-run"});
 }
 
 TEST_F(Refine, AJoinNamesWhatIsMissing) {
@@ -86,12 +82,12 @@ TEST_F(Refine, AJoinNamesWhatIsMissing) {
   const std::string coarse = ReadText(folder_ / "o/field.npz");
   const ProgramOutcome joined = RefineWith({"--join"});
   EXPECT_EQ(joined.code, static_cast<int>(ExitCode::kInput));
-  EXPECT_NE(joined.text.find("of 3 and"), std::string::npos) << joined.text;
+  EXPECT_SAYS(joined, "of 3 and");
   // Of other settings all are missing, and which differ is said.
   const ProgramOutcome other = Regrade({"refine", folder_ / "o", "--blocks", "3", "--splats",
                                         "5", "--splat-steps", "90", "--join"});
   EXPECT_EQ(other.code, static_cast<int>(ExitCode::kInput));
-  EXPECT_NE(other.text.find("was 4.0, now 5.0"), std::string::npos) << other.text;
+  EXPECT_SAYS(other, "was 4.0, now 5.0");
   EXPECT_EQ(ReadText(folder_ / "o/field.npz"), coarse);
 }
 

@@ -54,8 +54,8 @@ EvaluationMetrics MeasuredEvaluation() {
   row.heat_map = "heatmaps/a.png";
   row.heat_map_from = 3;
   metrics.consistency = {row};
-  metrics.pairs = {{"styled", 3, 8, 0.001, 30, 0.8, false, 1, 2, 3, 4, 5}};
-  FidelityMetrics fidelity;
+  metrics.pairs = {{"styled", 3, 8, 0.001, 30, {}, 0.8, false, 1, 2, 3, 4, 5}};
+  FidelityRow fidelity;
   fidelity.sequence = "styled";
   fidelity.psnr_to_2d_db = 27;
   fidelity.hue_std = 0.19;

@@ -8,9 +8,12 @@
 
 #include "pipeline/report/html.h"
 #include "pipeline/report/html_text.h"
+#include "tests/support/temporary_folder.h"
 
 namespace regrade {
 namespace {
+
+using testing::CountOf;
 
 ReportPicture Picture() { return {"\xFF\xD8\xFF pixels", 64, 48}; }
 
@@ -61,13 +64,6 @@ ReportPictures SomePictures() {
   pictures.cameras.cameras = {{0, 0, 0, 1, 0.5, true, "a.jpg"},
                               {1, 0.2, 0, 1, 0.5, false, "b"}};
   return pictures;
-}
-
-size_t Count(const std::string& text, const std::string& what) {
-  size_t count = 0;
-  for (size_t at = text.find(what); at != std::string::npos; at = text.find(what, at + 1))
-    ++count;
-  return count;
 }
 
 TEST(HtmlText, EscapesWhatAPageCouldRun) {
@@ -140,16 +136,17 @@ TEST(ReportHtml, HostileNamesStayText) {
   pictures.films[0].file = pictures.films[0].caption = evil;
   const std::string page = ReportHtml(report, pictures);
   // As many scripts and pictures as on the harmless page.
-  EXPECT_EQ(Count(page, "<script"), Count(harmless, "<script"));
-  EXPECT_EQ(Count(page, "<img"), Count(harmless, "<img"));
-  EXPECT_EQ(Count(page, "alert('x')"), 0u);
-  EXPECT_GE(Count(page, "&lt;script&gt;alert(&#39;x&#39;)"), 20u);
+  EXPECT_EQ(CountOf(page, "<script"), CountOf(harmless, "<script"));
+  EXPECT_EQ(CountOf(page, "<img"), CountOf(harmless, "<img"));
+  EXPECT_EQ(CountOf(page, "alert('x')"), 0u);
+  EXPECT_GE(CountOf(page, "&lt;script&gt;alert(&#39;x&#39;)"), 20u);
 }
 
 TEST(ReportHtml, FetchesNothing) {
   const std::string page = ReportHtml(SomeReport(), SomePictures());
-  EXPECT_EQ(Count(page, "http://") + Count(page, "https://") + Count(page, "@import"), 0u);
-  EXPECT_EQ(Count(page, "<link"), 0u);
+  EXPECT_EQ(CountOf(page, "http://") + CountOf(page, "https://") + CountOf(page, "@import"),
+            0u);
+  EXPECT_EQ(CountOf(page, "<link"), 0u);
   const std::regex address("(src|href|poster)=\"([^\"]{0,24})");
   int addresses = 0;
   for (std::sregex_iterator it(page.begin(), page.end(), address), end; it != end;
@@ -180,7 +177,7 @@ TEST(ReportHtml, ConsistencyNeverStandsAlone) {
 
 TEST(ReportHtml, AnUndefinedPairBreaksTheLine) {
   const std::string page = ReportHtml(SomeReport(), SomePictures());
-  EXPECT_EQ(Count(page, "<polyline"), 2u);
+  EXPECT_EQ(CountOf(page, "<polyline"), 2u);
 }
 
 TEST(ReportHtml, TheBoundIsDrawnOverTheSteps) {
@@ -273,8 +270,9 @@ TEST(ReportHtml, RowsOfStagesComeFromLabels) {
 
 TEST(ReportHtml, IsWholeWithoutJavaScript) {
   const std::string page = ReportHtml(SomeReport(), SomePictures());
-  EXPECT_EQ(Count(page, "<script"), 1u);  // the sliding edge between the headline pictures
-  EXPECT_GE(Count(page, "<svg"), 2u);
+  EXPECT_EQ(CountOf(page, "<script"),
+            1u);  // the sliding edge between the headline pictures
+  EXPECT_GE(CountOf(page, "<svg"), 2u);
 }
 
 TEST(ReportHtml, AnEmptyReportIsAPage) {

@@ -21,7 +21,7 @@ RunReport Report() {
   far.tc_psnr_mean_db = Metric::Undefined("too few frames");
   ConsistencyMetrics film{.sequence = "path_styled", .gap = 1};
   film.tc_psnr_mean_db = Metric(std::numeric_limits<double>::infinity());
-  FidelityMetrics fidelity{.sequence = "styled"};
+  FidelityRow fidelity{.sequence = "styled"};
   fidelity.structure = 0.97;
   fidelity.psnr_to_2d_db = std::nan("");
   RunReport report;
@@ -84,11 +84,13 @@ TEST(Requirements, WithoutANumberTheSentenceSaysWhatIsThere) {
   const auto sentence = [&report](const char* text) { return Failed(text, report, {1})[0]; };
   EXPECT_EQ(sentence("styled:structure>=1"),
             "styled:structure>=1: structure of styled has no value (nothing was measured)");
-  FidelityMetrics silent{.sequence = "styled"};
-  silent.chroma = Metric::Undefined("");
-  report.evaluation.fidelity.push_back(silent);
-  EXPECT_EQ(sentence("styled:chroma>=1"),
-            "styled:chroma>=1: chroma of styled has no value, and the report does not say why");
+  ConsistencyMetrics silent{.sequence = "styled"};
+  silent.coverage = Metric::Undefined("");
+  report.evaluation.consistency.push_back(silent);
+  EXPECT_EQ(
+      sentence("styled:coverage:1>=1"),
+      "styled:coverage:1>=1: coverage of styled at gap 1 has no value, and the report does "
+      "not say why");
 }
 
 TEST(Requirements, FramesThatDoNotChangeAreAboveEveryBound) {

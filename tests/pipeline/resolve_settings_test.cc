@@ -279,13 +279,6 @@ TEST(ResolveSettings, H68_AReproducibleRunOnTheGpuHasExactSums) {
   EXPECT_FALSE(both({}, {.run_json = run}));
 }
 
-TEST(ResolveSettings, F22_ErrorsOfAFileNameTheLine) {
-  const TemporaryFolder folder;
-  WriteText(folder / "run.json", "{\"arguments\": [],\n\"options\": {\n\"preset\": \"fast\"}}");
-  EXPECT_REGRADE_ERROR(Resolve({"--config", folder / "run.json"}), ExitCode::kUsage,
-                       "run.json:3:");
-}
-
 // Headings are for readers; a stage's inputs hold names and values alone.
 TEST(OptionValues, AreFreeOfHeadings) {
   SceneOptions scene;

@@ -86,10 +86,8 @@ TEST(Retouch, TheSceneFollowsEachEditAsItsExactTruth) {
   REGRADE_AT_NIGHT();
   const TemporaryFolder folder;
   const auto edited = [&](const std::string& grade) { return folder / (grade + ".png"); };
-  ASSERT_EQ(Regrade({"synth", folder / "s", "--views", "16", "--size", "192x144", "--grade",
-                     "global"})
-                .code,
-            0);
+  testing::Said(
+      {"synth", folder / "s", "--views", "16", "--size", "192x144", "--grade", "global"});
   for (const std::string grade : {"global", "local", "object", "vignette"})
     WriteGraded(edited(grade), grade);
   EXPECT_EQ(ReadImage(edited("global")).pixels,
@@ -107,10 +105,9 @@ TEST(Retouch, TheSceneFollowsEachEditAsItsExactTruth) {
   ASSERT_EQ(outcome.code, 0) << outcome.text;
   const auto retouch = [&](const std::string& grade, const std::string& picture,
                            const std::vector<std::string>& more) {
-    std::vector<std::string> command{"retouch",  folder / "out", "--photo", "00006",
-                                     "--edited", picture,        "--name",  grade};
-    command.insert(command.end(), more.begin(), more.end());
-    return Regrade(command);
+    return Regrade(
+        {"retouch", folder / "out", "--photo", "00006", "--edited", picture, "--name", grade},
+        more);
   };
   const auto style = [&](const std::string& grade) { return folder / ("out/styles/" + grade); };
   using testing::Computed;
@@ -125,9 +122,7 @@ TEST(Retouch, TheSceneFollowsEachEditAsItsExactTruth) {
     ASSERT_EQ(outcome.code, 0) << outcome.text;
     EXPECT_TRUE(fs::exists(style(grade) + "/edit.cube"));
     const bool local = grade == "local" || grade == "object";
-    EXPECT_NE(outcome.text.find(local ? "depends on the place" : "one map of colours"),
-              std::string::npos)
-        << outcome.text;
+    EXPECT_SAYS(outcome, local ? "depends on the place" : "one map of colours");
     if (grade == "vignette") continue;
     source = Frames(style(grade) + "/frames/source");
     const EditTruth truth(grade, source, kEdited);
@@ -170,10 +165,10 @@ TEST(Retouch, TheSceneFollowsEachEditAsItsExactTruth) {
   outcome = Regrade({"retouch", folder / "out", "--photo", "nothere", "--edited",
                      edited("global"), "--name", "global"});
   EXPECT_EQ(outcome.code, 3);
-  EXPECT_NE(outcome.text.find("is no photo of the capture"), std::string::npos);
+  EXPECT_SAYS(outcome, "is no photo of the capture");
   outcome = retouch("global", folder / "s/images/00009.png", {});
   EXPECT_EQ(outcome.code, 3) << outcome.text;
-  EXPECT_NE(outcome.text.find("photo"), std::string::npos) << outcome.text;
+  EXPECT_SAYS(outcome, "photo");
 }
 
 // Of a picture: the mean of the four corners, of a twentieth of the sides each, and of a middle
@@ -195,10 +190,8 @@ std::pair<double, double> CornersAndMiddle(const Image& a, const Image& b) {
 
 TEST(Retouch, H190_AKeptVignetteIsOnFilmsAndStillsAndNotInTheScene) {
   const TemporaryFolder folder;
-  ASSERT_EQ(Regrade({"synth", folder / "s", "--views", "5", "--size", "192x144", "--grade",
-                     "vignette"})
-                .code,
-            0);
+  testing::Said(
+      {"synth", folder / "s", "--views", "5", "--size", "192x144", "--grade", "vignette"});
   std::vector<std::string> reconstruct{"reconstruct",  folder / "s/truth", "--out",
                                        folder / "out", "--device",         "cpu"};
   for (const std::string& flag : testing::TinyFlags()) reconstruct.push_back(flag);
@@ -208,7 +201,7 @@ TEST(Retouch, H190_AKeptVignetteIsOnFilmsAndStillsAndNotInTheScene) {
                                     folder / "s/truth/graded/00002.png", "--name", "v",
                                     "--keep-vignette", "--until", "render"});
   ASSERT_EQ(outcome.code, 0) << outcome.text;
-  EXPECT_NE(outcome.text.find("films and stills have it"), std::string::npos) << outcome.text;
+  EXPECT_SAYS(outcome, "films and stills have it");
   const std::string style = folder / "out/styles/v";
   EXPECT_NE(ReadText(style + "/run.json").find("\"vignette\": \"-0."), std::string::npos);
   // The film against the frames that are measured, which have none: 1 - 0.35 r^2 at the
@@ -224,10 +217,8 @@ TEST(Retouch, H190_AKeptVignetteIsOnFilmsAndStillsAndNotInTheScene) {
   EXPECT_NEAR(middle, 1, 0.02);
   // Stills, with and without.
   const auto still = [&](const std::vector<std::string>& more) {
-    std::vector<std::string> command{"render", folder / "out", "--name",
-                                     "v",      "--still",      "00002"};
-    command.insert(command.end(), more.begin(), more.end());
-    EXPECT_EQ(Regrade(command).code, 0);
+    EXPECT_EQ(Regrade({"render", folder / "out", "--name", "v", "--still", "00002"}, more).code,
+              0);
     return ReadImage(style + "/stills/00002.png");
   };
   const auto [still_corners, still_middle] =
@@ -265,7 +256,7 @@ TEST(Retouch, ALocalEditIsLearnedFromItsPhotoAlone) {
       Regrade({"retouch", folder / "out", "--photo", "00002.png", "--edited",
                folder / "s/truth/graded/00002.png", "--name", "dark"});
   ASSERT_EQ(outcome.code, 0) << outcome.text;
-  EXPECT_NE(outcome.text.find("depends on the place"), std::string::npos) << outcome.text;
+  EXPECT_SAYS(outcome, "depends on the place");
   EXPECT_TRUE(fs::exists(folder / "out/styles/dark/retouched/00002.png"));
   EXPECT_NE(ReadText(folder / "out/styles/dark/retouch.json").find("\"local\""),
             std::string::npos);
@@ -310,10 +301,8 @@ TEST(Retouch, ALocalEditIsLearnedFromItsPhotoAlone) {
   for (int y = 0; y < half.height; ++y)
     for (int i = 0; i < 3 * half.width / 2; ++i) half.at(0, y)[i] *= 0.15f;
   WritePng16(folder / "half.png", half);
-  ASSERT_EQ(Regrade({"retouch", folder / "out", "--photo", "00002.png", "--edited",
-                     folder / "half.png", "--name", "half", "--until", "render"})
-                .code,
-            0);
+  testing::Said({"retouch", folder / "out", "--photo", "00002.png", "--edited",
+                 folder / "half.png", "--name", "half", "--until", "render"});
   const auto error_of = [&](const char* sequence) {
     const Image frame =
         ReadImage(folder / (Concat("out/styles/half/frames/", sequence, "/00002.png")));
@@ -334,14 +323,13 @@ TEST(Retouch, ALocalEditIsLearnedFromItsPhotoAlone) {
 TEST(Retouch, ARenderIsWrittenToBeEdited) {
   const TemporaryFolder folder;
   testing::WriteCapture(folder / "s", 5, "96x72");
-  std::vector<std::string> reconstruct{"reconstruct",  folder / "s/truth", "--out",
-                                       folder / "out", "--device",         "cpu"};
-  for (const std::string& flag : testing::TinyFlags()) reconstruct.push_back(flag);
-  ASSERT_EQ(Regrade(reconstruct).code, 0);
+  ASSERT_EQ(
+      Regrade({"reconstruct", folder / "s/truth", "--out", folder / "out", "--device", "cpu"},
+              testing::TinyFlags())
+          .code,
+      0);
   const auto retouch = [&](std::vector<std::string> more) {
-    std::vector<std::string> all{"retouch", folder / "out", "--photo", "00002"};
-    all.insert(all.end(), more.begin(), more.end());
-    return Regrade(all);
+    return Regrade({"retouch", folder / "out", "--photo", "00002"}, more);
   };
   const std::string render = folder / "out/retouch/00002.tif", edited = folder / "edited.png";
   ProgramOutcome outcome = retouch({});
@@ -349,10 +337,10 @@ TEST(Retouch, ARenderIsWrittenToBeEdited) {
   WritePng16(edited, Image(96, 72));
   outcome = retouch({"--from", "render", "--edited", edited});
   EXPECT_EQ(outcome.code, 3);
-  EXPECT_NE(outcome.text.find("not written yet"), std::string::npos) << outcome.text;
+  EXPECT_SAYS(outcome, "not written yet");
   outcome = retouch({"--from", "render"});
   ASSERT_EQ(outcome.code, 0) << outcome.text;
-  EXPECT_NE(outcome.text.find("00002.tif"), std::string::npos) << outcome.text;
+  EXPECT_SAYS(outcome, "00002.tif");
   EXPECT_FALSE(fs::exists(folder / "out/styles"));
   DecodeLimits limits;
   limits.min_side = 1;
@@ -368,15 +356,13 @@ TEST(Retouch, ARenderIsWrittenToBeEdited) {
   WritePng16(edited, picture);
   outcome = retouch({"--from", "render", "--edited", edited, "--name", "dim"});
   ASSERT_EQ(outcome.code, 0) << outcome.text;
-  EXPECT_NE(outcome.text.find("one map of colours"), std::string::npos) << outcome.text;
+  EXPECT_SAYS(outcome, "one map of colours");
   EXPECT_TRUE(fs::exists(folder / "out/styles/dim/edit.cube"));
   EXPECT_NE(ReadText(folder / "out/styles/dim/retouch.json").find("\"render\""),
             std::string::npos);
   // Its LUT is the edit's own map.
-  ASSERT_EQ(Regrade({"export", folder / "out", "--format", "cube", "--name", "dim", "--out",
-                     folder / "dim.cube"})
-                .code,
-            0);
+  testing::Said({"export", folder / "out", "--format", "cube", "--name", "dim", "--out",
+                 folder / "dim.cube"});
   const ColorLut own = ReadCubeFile(folder / "dim.cube"),
                  edit = ReadCubeFile(folder / "out/styles/dim/edit.cube");
   ASSERT_EQ(own.table.values.size(), edit.table.values.size());

@@ -66,27 +66,15 @@ TEST(RunReport, ShowsEveryPartOfTheRun) {
   const TemporaryFolder folder;
   const std::string style = testing::SourceDir() + "/assets/style_sunset.png";
   testing::WriteCapture(folder / "s", 6, "96x72");
-  std::vector<std::string> run{"run",
-                               folder / "s/truth",
-                               "--style",
-                               style,
-                               "--out",
-                               folder / "e",
-                               "--preset",
-                               "draft",
-                               "--effects",
-                               "exposure=off",
-                               "--device",
-                               "cpu",
-                               "--verbose",
-                               "--config",
-                               R"({"style-rays": 512})"};
+  std::vector<std::string> run = testing::Words(
+      "--preset draft --effects exposure=off --device cpu --verbose --config "
+      R"({"style-rays":512})");
+  run.insert(run.begin(), {"run", folder / "s/truth", "--style", style, "--out", folder / "e"});
   for (const std::string& flag : testing::TinyFlags("voxels")) run.push_back(flag);
   *(std::find(run.begin(), run.end(), "--fit-steps") + 1) = "150";
   const testing::ProgramOutcome done = Regrade(run);
   ASSERT_EQ(done.code, 0) << done.text;
-  EXPECT_NE(done.text.find("exposure off: not measured (off by --effects)"), std::string::npos)
-      << done.text;
+  EXPECT_SAYS(done, "exposure off: not measured (off by --effects)");
 
   // Three sequences at the photos' positions and three along the film's path, at gaps 1 and 5;
   // the path has three frames, so no pair is 5 apart.
@@ -169,8 +157,7 @@ TEST(RunReport, ShowsEveryPartOfTheRun) {
   EXPECT_LT(page.find("class=mainfilm"), page.find("class=compare"));
 
   // Evaluated again with other pairs: the maps of the earlier ones are gone.
-  const testing::ProgramOutcome measured = Regrade({"evaluate", folder / "e", "--gaps", "2"});
-  ASSERT_EQ(measured.code, 0) << measured.text;
+  testing::Said({"evaluate", folder / "e", "--gaps", "2"});
   EXPECT_EQ(HeatMapsNamed(folder / "e/styles/style_sunset"), 6);
   EXPECT_EQ(HeatMapFiles(folder / "e/styles/style_sunset"), 6);
 
@@ -203,7 +190,7 @@ TEST(RunReport, ShowsEveryPartOfTheRun) {
   // No colours at these voxels are closer than those that were fitted to the pictures.
   EXPECT_GT(to_2d("control_ceiling"), to_2d("styled"));
   EXPECT_GT(to_2d("control_ceiling"), to_2d("control_linear_map"));
-  EXPECT_NE(bounded.text.find("fitted to the 2D method's pictures"), std::string::npos);
+  EXPECT_SAYS(bounded, "fitted to the 2D method's pictures");
   const testing::ProgramOutcome again_bounded =
       Regrade({"evaluate", folder / "e", "--gaps", "2", "--control-field"});
   ASSERT_EQ(again_bounded.code, 0) << again_bounded.text;
@@ -238,7 +225,7 @@ TEST(RunReport, H157_H158_AGreyStyleIsNamedAndWithoutEvaluationNothingMoves) {
   ASSERT_NE(notices, nullptr);
   const std::string notice = notices->AsArray()[0].AsString();
   EXPECT_NE(notice.find("single colour"), std::string::npos) << notice;
-  EXPECT_NE(done.text.find(notice), std::string::npos);
+  EXPECT_SAYS(done, notice);
   EXPECT_NE(testing::ReadText(folder / "e/styles/grey/report.html").find("single colour"),
             std::string::npos);
 }

@@ -5,18 +5,17 @@
 #include <algorithm>
 #include <cmath>
 
+#include "kernels/scene/facing.h"
 #include "pipeline/capture/working_views.h"
 #include "tests/support/expect_error.h"
+#include "tests/support/pinhole.h"
 
 namespace regrade {
 namespace {
 
 // k1 moves the corner at r = 1.25 (fx = 400 of 800 x 600) by k1 r^3 400 pixels.
 Camera CameraWithShift(double pixels) {
-  Camera camera;
-  camera.width = 800, camera.height = 600;
-  camera.fx = camera.fy = 400;
-  camera.cx = 400, camera.cy = 300;
+  Camera camera = testing::PinholeOf(800, 600, 400);
   camera.lens = LensModel::kOpenCv;
   camera.distortion[0] = pixels / (400 * 1.25 * 1.25 * 1.25);
   return camera;
@@ -102,9 +101,7 @@ Capture CaptureSeenAllRound(int far) {
     const Vec3d forward = Normalized(-center),
                 right = Normalized(Cross(forward, Vec3d{0, 0, 1}));
     RigidTransform& t = view.camera.camera_from_world;
-    t.rotation.row[0] = right, t.rotation.row[1] = Cross(forward, right);
-    t.rotation.row[2] = forward;
-    t.translation = -(t.rotation * center);
+    t = Facing(center, forward, right);
     capture.views.push_back(view);
     const auto add = [&](const Vec3d& position) {
       ScenePoint point;
@@ -158,10 +155,7 @@ TEST(SceneProfile, FarSurroundingsOfSplatsLeaveTheBoxAsItIs) {
 
 // What is given is not measured.
 TEST(SceneProfile, OptionsOfTheBoxReplaceMeasurements) {
-  BoxOptions box;
-  box.camera_range = 2;
-  box.near_clip = 0;
-  box.background = 0.5f;
+  BoxOptions box{.camera_range = 2, .near_clip = 0, .background = 0.5f};
   for (const char* background : {"background=off", "background=on"}) {
     const SceneProfile given =
         ProfileScene(CaptureSeenAllRound(5), 2, std::string(background) + ",exposure=off", box);

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "kernels/field/pad_sh_basis.h"
+#include "kernels/image/decibels.h"
 #include "kernels/render/field_renderer.h"
 #include "kernels/splats/extent.h"
 #include "kernels/splats/splat_field.h"
@@ -16,7 +17,6 @@
 #include "pipeline/page/splat_numbers.h"
 #include "pipeline/page/style_codec.h"
 #include "tests/support/expect_error.h"
-#include "tests/support/psnr.h"
 #include "tests/support/small_splats.h"
 #include "tests/support/styled_ball.h"
 
@@ -43,7 +43,7 @@ TEST(SplatCodec, DecodedSplatsRenderAsTheExactOnes) {
       const RadianceField field = FieldOf(800, basis, antialiased);
       const RadianceField decoded = DecodeField(EncodeField(field, kSplatPageStep));
       EXPECT_EQ(decoded.geometry->splats.fit_pixel, field.geometry->splats.fit_pixel);
-      EXPECT_GE(testing::Psnr(Picture(field), Picture(decoded)), 48) << basis;
+      EXPECT_GE(DecibelsBetween(Picture(field), Picture(decoded)), 48) << basis;
     }
 }
 
@@ -54,7 +54,7 @@ TEST(SplatCodec, HigherHarmonicsAreLeftOut) {
   EXPECT_EQ(decoded.appearance.basis, 9);
   RadianceField lower = field;
   lower.appearance = LimitShBasis(field.appearance, 9);
-  EXPECT_GE(testing::Psnr(Picture(lower), Picture(decoded)), 47);
+  EXPECT_GE(DecibelsBetween(Picture(lower), Picture(decoded)), 47);
 }
 
 // Its style is that of the colours without them.
@@ -72,7 +72,7 @@ TEST(SplatCodec, AStyleOfDegreeThreeIsAppliedToThePagesHarmonics) {
   for (int64_t i = 0; i < page.appearance.sh.size(); ++i)
     page.appearance.sh[i] = all.sh[i / 9 * 16 + i % 9];
   page.background = stored.background;
-  EXPECT_GE(testing::Psnr(Picture(page), Picture(style.styled)), 40);
+  EXPECT_GE(DecibelsBetween(Picture(page), Picture(style.styled)), 40);
 }
 
 // EQ(page-splat): half a step of each number at most, for splats far outside, too.
@@ -160,18 +160,6 @@ TEST(SplatCodec, DamagedSectionsAreRefused) {
     EXPECT_REGRADE_ERROR(DecodeField(cut), ExitCode::kInput, "damaged");
     missing.sections.erase(missing.sections.begin() + static_cast<std::ptrdiff_t>(s));
     EXPECT_REGRADE_ERROR(DecodeField(missing), ExitCode::kInput, "is missing");
-    const std::string bytes = Inflate(page.sections[s].packed, 1 << 24, "test");
-    for (size_t k = 0; k < 40; ++k) {
-      std::string changed = bytes;
-      changed[k * bytes.size() / 40] ^= static_cast<char>(1 << (k % 8));
-      PageField damaged = page;
-      damaged.sections[s].packed = Deflate(changed);
-      try {
-        DecodeField(damaged);
-      } catch (const Error& error) {
-        EXPECT_EQ(static_cast<int>(error.code()), static_cast<int>(ExitCode::kInput));
-      }
-    }
   }
 }
 

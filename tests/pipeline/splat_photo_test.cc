@@ -5,12 +5,12 @@
 #include <algorithm>
 #include <cmath>
 
+#include "kernels/image/decibels.h"
 #include "kernels/image/resize.h"
 #include "kernels/splats/cpu/render_splats.h"
 #include "pipeline/images/image_file.h"
 #include "pipeline/splat_files/read_splats.h"
 #include "tests/support/data.h"
-#include "tests/support/psnr.h"
 
 namespace regrade {
 namespace {
@@ -60,15 +60,14 @@ TEST(SplatFiles, RealSplatsShowTheirPhoto) {
   const Vec3d center{-0.027891476255964984, -0.7842593389297035, 1.140255089311304};
   camera.camera_from_world.rotation = world_from_camera.Transposed();
   camera.camera_from_world.translation = -(camera.camera_from_world.rotation * center);
-  SplatOptions options;
-  options.near_plane = 0.01;
+  SplatOptions options{.near_plane = 0.01};
   const SplatPicture<float> picture =
       RenderSplats(MakeSplatFrame(scene.splats.view(), camera, options));
   Image seen(camera.width, camera.height);
   seen.pixels.assign(picture.color.begin(), picture.color.end());
   const Image photo = WithoutLens(
       Resize(DecodePhoto(testing::DataPath("fox/images/0001.jpg")).image, 270, 480), camera);
-  const double psnr = testing::Psnr(seen, photo);
+  const double psnr = DecibelsBetween(seen, photo);
   RecordProperty("psnr", std::to_string(psnr));
   // 26.8 dB; the program that fitted the splats measured 30.2 dB over all photos held out.
   EXPECT_GT(psnr, 25);

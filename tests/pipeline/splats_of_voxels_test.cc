@@ -9,8 +9,9 @@
 #include <string>
 #include <utility>
 
+#include "kernels/image/decibels.h"
 #include "kernels/render/field_renderer.h"
-#include "tests/support/psnr.h"
+#include "tests/support/pinhole.h"
 #include "tests/support/small_field.h"
 
 namespace regrade {
@@ -19,9 +20,7 @@ namespace {
 // On a ring, looking at the origin.
 Camera OnRing(double angle, double radius) {
   const Vec3d center{radius * std::cos(angle), radius * std::sin(angle), 0.5};
-  Camera camera;
-  camera.width = 64, camera.height = 48;
-  camera.fx = camera.fy = 60, camera.cx = 32, camera.cy = 24;
+  Camera camera = testing::PinholeOf(64, 48, 60);
   Mat3d& rotation = camera.camera_from_world.rotation;
   rotation.row[2] = Normalized(-center);
   rotation.row[0] = Normalized(Cross(rotation.row[2], Vec3d{0, 0, 1}));
@@ -43,22 +42,10 @@ Capture Ring(int count) {
 
 // A coloured ball of voxels, of which `shift` changes the colours.
 StoredField Ball(float shift) {
-  RadianceField field = testing::RandomField({24, 24, 24}, 1, 1.0, 5);
-  auto geometry = std::make_shared<Geometry>(*field.geometry);
-  geometry->frame.center = {0, 0, 0};
-  geometry->frame.radius = {1, 1, 1};
-  for (int64_t v = 0; v < geometry->links.size(); ++v) {
-    const Vec3f p =
-        geometry->frame.WorldOf({static_cast<float>(v / 576), static_cast<float>(v / 24 % 24),
-                                 static_cast<float>(v % 24)});
-    const float inside = 0.7f - Norm(p);
-    geometry->density[v] = inside > 0 ? 200.0f * inside : -1.0f;
-    for (int c = 0; c < 3; ++c)
-      field.appearance.sh[3 * v + c] =
-          0.8f * std::sin(3.0f * p[c] + static_cast<float>(c) + shift);
-  }
-  field.geometry = geometry;
-  return {std::move(field), {}, {}};
+  const auto color = [&](const Vec3f& p, int c) {
+    return 0.8f * std::sin(3.0f * p[c] + static_cast<float>(c) + shift);
+  };
+  return {testing::VoxelBall(0.7f, 200, color), {}, {}};
 }
 
 double DbOnNewViews(const SplatsOfVoxels& fit, const StoredField& voxels,
@@ -68,8 +55,9 @@ double DbOnNewViews(const SplatsOfVoxels& fit, const StoredField& voxels,
   const std::vector<Camera> views = fit.MeasuredViews(voxels);
   double worst = 1e9;
   for (size_t i = 0; i < views.size(); ++i)
-    worst = std::min(worst, testing::Psnr(of_splats.Render(fit.MeasuredViews(splats)[i]).color,
-                                          of_voxels.Render(views[i]).color));
+    worst =
+        std::min(worst, DecibelsBetween(of_splats.Render(fit.MeasuredViews(splats)[i]).color,
+                                        of_voxels.Render(views[i]).color));
   return worst;
 }
 

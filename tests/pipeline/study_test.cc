@@ -19,8 +19,7 @@ TEST(Study, APageHasTheFilmsAndNoPaths) {
   for (const char* name : {"ours", "theirs"})
     for (const char* clip : {"fern", "horns"})
       WriteText(folder / (std::string(name) + "/" + clip + ".mp4"), kFilm + name + clip);
-  StudyOptions options;
-  options.question = "Which </script> is better?";
+  StudyOptions options{.question = "Which </script> is better?"};
   const MadeStudy made = MakeStudy({folder / "ours", folder / "theirs/"}, options);
   EXPECT_EQ(made.methods, (std::vector<std::string>{"ours", "theirs"}));
   EXPECT_EQ(made.clips, (std::vector<std::string>{"fern", "horns"}));

@@ -15,6 +15,7 @@ namespace regrade {
 namespace {
 
 namespace fs = std::filesystem;
+using testing::PoseCode;
 using testing::ProgramOutcome;
 using testing::ReadText;
 using testing::RunProgram;
@@ -27,9 +28,7 @@ ProgramOutcome RunIn(const std::vector<std::string>& words) {
 
 std::string Synthetic(const TemporaryFolder& folder) {
   const std::string capture = folder / "capture";
-  EXPECT_EQ(
-      RunProgram(REGRADE_PROGRAM, {"synth", capture, "--views", "5", "--size", "96x72"}).code,
-      0);
+  testing::WriteCapture(capture, 5, "96x72");
   return capture + "/truth";  // the photos with their poses
 }
 
@@ -46,10 +45,7 @@ TEST(Surroundings, F23_WithoutHomeAndTemporaryFolder) {
 TEST(Surroundings, F26_AClockThatJumpsChangesNothing) {
   const TemporaryFolder folder;
   const std::string capture = Synthetic(folder);
-  EXPECT_EQ(RunProgram(REGRADE_PROGRAM,
-                       {"pose", capture, "--out", folder / "plain", "--tracks", "given"})
-                .code,
-            0);
+  EXPECT_EQ(PoseCode(capture, folder / "plain"), 0);
   const std::string clock = std::string("LD_PRELOAD=") + ODD_CLOCK;
   for (const char* when : {"fresh", "again"}) {
     const ProgramOutcome outcome =
@@ -84,8 +80,7 @@ TEST(Surroundings, F27_TheCurrentFolderWasDeleted) {
   };
   const ProgramOutcome relative = run_gone("out");
   EXPECT_EQ(relative.code, 5) << relative.text;
-  EXPECT_NE(relative.text.find("the current folder does not exist"), std::string::npos)
-      << relative.text;
+  EXPECT_SAYS(relative, "the current folder does not exist");
   EXPECT_EQ(run_gone(folder / "out").code, 0);
 }
 

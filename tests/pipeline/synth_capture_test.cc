@@ -8,7 +8,6 @@
 #include <cstring>
 #include <filesystem>
 #include <fstream>
-#include <iterator>
 #include <map>
 #include <vector>
 
@@ -20,6 +19,8 @@
 #include "pipeline/images/image_file.h"
 #include "pipeline/synth/synth_effects.h"
 #include "reconstruct/colmap/colmap_model.h"
+#include "tests/support/expect_error.h"
+#include "tests/support/temporary_folder.h"
 #include "tests/support/threads.h"
 
 namespace regrade {
@@ -27,29 +28,15 @@ namespace {
 
 namespace fs = std::filesystem;
 
-std::string Bytes(const fs::path& path) {
-  std::ifstream in(path, std::ios::binary);
-  return {std::istreambuf_iterator<char>(in), {}};
-}
+std::string Bytes(const fs::path& path) { return testing::ReadText(path.string()); }
 
 class SynthCapture : public ::testing::Test {
  protected:
-  void SetUp() override {
-    root_ = fs::path(::testing::TempDir()) /
-            ("synth_" +
-             std::string(::testing::UnitTest::GetInstance()->current_test_info()->name()));
-    fs::remove_all(root_);
-  }
-  void TearDown() override { fs::remove_all(root_); }
-
   // Writes a small capture and returns its folder.
   fs::path Write(const std::string& name, const std::string& effects = "",
                  const ProgressFunction& progress = {}, int views = 3) {
-    SynthOptions options;
-    options.views = views;
-    options.size = "64x48";
-    options.effects = effects;
-    WriteSyntheticCapture((root_ / name).string(), options, progress);
+    WriteSyntheticCapture((root_ / name).string(),
+                          {.views = views, .size = "64x48", .effects = effects}, progress);
     return root_ / name;
   }
 
@@ -61,7 +48,8 @@ class SynthCapture : public ::testing::Test {
     return files;
   }
 
-  fs::path root_;
+  const testing::TemporaryFolder folder_;
+  const fs::path root_ = folder_.path();
 };
 
 TEST_F(SynthCapture, MasksAreOfOneObjectAndSomeAreWrong) {
@@ -106,10 +94,7 @@ TEST_F(SynthCapture, WritesPhotosAndTruth) {
 }
 
 TEST_F(SynthCapture, WithoutFlowTheRestIsTheSame) {
-  SynthOptions options;
-  options.scene = "street";
-  options.views = 4;
-  options.size = "32x24";
+  SynthOptions options{.scene = "street", .views = 4, .size = "32x24"};
   WriteSyntheticCapture((root_ / "with").string(), options);
   options.flow = false;
   WriteSyntheticCapture((root_ / "without").string(), options);
@@ -270,44 +255,28 @@ TEST_F(SynthCapture, GainsStayInRangeAndNoiseHasItsSigma) {
 }
 
 TEST_F(SynthCapture, RefusesUnknownEffectsScenesAndSizes) {
-  const auto refusal = [&](SynthOptions options) -> std::string {
-    try {
-      WriteSyntheticCapture((root_ / "never").string(), options);
-    } catch (const Error& error) {
-      EXPECT_EQ(error.code(), ExitCode::kUsage);
-      return error.what_failed() + " | " + error.hint();
-    }
-    ADD_FAILURE();
-    return "";
+  const auto refusal = [&](const SynthOptions& options) {
+    const Error error =
+        testing::ErrorFrom([&] { WriteSyntheticCapture((root_ / "never").string(), options); });
+    EXPECT_EQ(error.code(), ExitCode::kUsage);
+    return error.what_failed() + " | " + error.hint();
   };
   for (const char* effects :
        {"fog", "noise,,exposure", "noise ", "motion-blur", "occluders", "barrel,fisheye"}) {
-    SynthOptions options;
-    options.effects = effects;
-    EXPECT_NE(refusal(options).find("masks, poses, mixed-cameras, and one lens"),
+    EXPECT_NE(refusal({.effects = effects}).find("masks, poses, mixed-cameras, and one lens"),
               std::string::npos);
   }
   for (const char* size : {"", "640", "640x", "x480", "640x480x3", "0x0", "8x8", "99999x2",
-                           "-64x48", "99999999999x48", "640 x 480"}) {
-    SynthOptions options;
-    options.size = size;
-    refusal(options);
-  }
-  SynthOptions options;
-  options.scene = "garden";
-  EXPECT_NE(refusal(options).find("table|wall|room"), std::string::npos);
+                           "-64x48", "99999999999x48", "640 x 480"})
+    refusal({.size = size});
+  EXPECT_NE(refusal({.scene = "garden"}).find("table|wall|room"), std::string::npos);
   EXPECT_FALSE(fs::exists(root_ / "never"));
 }
 
 TEST_F(SynthCapture, DoesNotMixWithOtherPhotos) {
   fs::create_directories(root_ / "mine" / "images");
   std::ofstream(root_ / "mine" / "images" / "holiday.jpg") << "x";
-  try {
-    Write("mine");
-    FAIL();
-  } catch (const Error& error) {
-    EXPECT_EQ(error.code(), ExitCode::kFolderInUse);
-  }
+  EXPECT_REGRADE_ERROR(Write("mine"), ExitCode::kFolderInUse, "");
   Write("other");
   EXPECT_THROW(Write("other", "noise"), Error);
 }

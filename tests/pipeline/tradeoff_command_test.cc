@@ -15,40 +15,28 @@ using testing::ProgramOutcome;
 using testing::Regrade;
 using testing::TemporaryFolder;
 
-size_t Count(const std::string& text, const std::string& what) {
-  size_t count = 0;
-  for (size_t at = text.find(what); at != std::string::npos; at = text.find(what, at + 1))
-    ++count;
-  return count;
-}
-
 TEST(TradeoffCommand, MeasuresContinuesAndPredicts) {
   const TemporaryFolder folder;
   const std::string style = testing::SourceDir() + "/assets/style_sunset.png";
   testing::WriteCapture(folder / "s", 6, "96x72");
   const auto tradeoff = [&](const std::vector<std::string>& more) {
-    std::vector<std::string> words{"tradeoff",     folder / "s/truth",
-                                   "--style",      style,
-                                   "--out",        folder / "t",
-                                   "--parameters", "fit-steps,style-min-weight,flow,ray-stop",
-                                   "--presets",    "none",
-                                   "--effects",    "view-dependence=off,exposure=off"};
-    for (const std::string& flag : testing::TinyFlags("voxels")) words.push_back(flag);
-    words.insert(words.end(), more.begin(), more.end());
-    return Regrade(words);
+    return Regrade(testing::Joined(
+                       {"tradeoff", folder / "s/truth", "--style", style, "--out", folder / "t",
+                        "--parameters", "fit-steps,style-min-weight,flow,ray-stop", "--presets",
+                        "none", "--effects", "view-dependence=off,exposure=off"},
+                       testing::TinyFlags("voxels")),
+                   more);
   };
   ProgramOutcome outcome = tradeoff({"--dry-run", "--budget", "1e-9"});
   ASSERT_EQ(outcome.code, 0) << outcome.text;
-  EXPECT_NE(outcome.text.find("flow: flow dis-ultrafast, about"), std::string::npos);
-  EXPECT_NE(outcome.text.find("the least useful --budget is about"), std::string::npos)
-      << outcome.text;
+  EXPECT_SAYS(outcome, "flow: flow dis-ultrafast, about");
+  EXPECT_SAYS(outcome, "the least useful --budget is about");
   EXPECT_FALSE(std::filesystem::exists(folder / "t"));
 
   // The base run counts: it spends this budget, and what budget is useful was said before it.
   outcome = tradeoff({"--repeats", "1", "--budget", "1e-9", "--json"});
   ASSERT_EQ(outcome.code, 0) << outcome.text;
-  EXPECT_NE(outcome.text.find("the budget is spent: 16 measurements"), std::string::npos)
-      << outcome.text;
+  EXPECT_SAYS(outcome, "the budget is spent: 16 measurements");
   EXPECT_FALSE(std::filesystem::exists(folder / "t/measurements.json"));
   const size_t said = outcome.text.find("{\"event\":\"budget\"");
   ASSERT_LT(said, outcome.text.find("\"stage_begin\"")) << outcome.text;
@@ -62,8 +50,7 @@ TEST(TradeoffCommand, MeasuresContinuesAndPredicts) {
   // With the base run there, the same budget is for one measurement.
   outcome = tradeoff({"--repeats", "1", "--budget", "1e-9"});
   ASSERT_EQ(outcome.code, 0) << outcome.text;
-  EXPECT_NE(outcome.text.find("the budget is spent: 15 measurements"), std::string::npos)
-      << outcome.text;
+  EXPECT_SAYS(outcome, "the budget is spent: 15 measurements");
   const size_t left =
       ReadJsonFile(folder / "t/measurements.json").At("measurements").AsArray().size();
   EXPECT_EQ(left, 1u);
@@ -74,7 +61,7 @@ TEST(TradeoffCommand, MeasuresContinuesAndPredicts) {
   // Four bases, three values of the steps, two weights, four flows and three ends of a ray.
   EXPECT_EQ(result.At("schema").AsInt(), 2);
   EXPECT_EQ(result.At("costs").AsArray().size(), 4u + 3 + 2 + 4 + 3);
-  EXPECT_EQ(Count(outcome.text, "] "), 16 - left);  // measurements are not repeated
+  EXPECT_EQ(testing::CountOf(outcome.text, "] "), 16 - left);  // measurements are not repeated
   int on_pareto_front = 0;
   for (const JsonValue& row : result.At("costs").AsArray()) {
     EXPECT_TRUE(row.At("accuracy").IsNumber()) << DumpJson(row, -1);
@@ -82,12 +69,12 @@ TEST(TradeoffCommand, MeasuresContinuesAndPredicts) {
     on_pareto_front += row.At("on_pareto_front").AsBool();
   }
   EXPECT_GE(on_pareto_front, 4);  // at least one per benchmark
-  EXPECT_EQ(Count(testing::ReadText(folder / "t/tradeoff.csv"), "\n"), 17u);
+  EXPECT_EQ(testing::CountOf(testing::ReadText(folder / "t/tradeoff.csv"), "\n"), 17u);
   EXPECT_NE(testing::ReadText(folder / "t/tradeoff.html").find("accuracy over time, flow"),
             std::string::npos);
   EXPECT_FALSE(std::filesystem::exists(folder / "t/work"));
   outcome = tradeoff({"--repeats", "1"});
-  EXPECT_EQ(Count(outcome.text, "] "), 0u) << outcome.text;
+  EXPECT_EQ(testing::CountOf(outcome.text, "] "), 0u) << outcome.text;
 
   // The base is an ordinary run, and its time is predicted from the costs.
   outcome = Regrade(
@@ -106,10 +93,8 @@ TEST(TradeoffCommand, MeasuresContinuesAndPredicts) {
                      "{\"schema\": 1, \"costs\": [{}]}");
   outcome = Regrade({"evaluate", folder / "t/base"});
   ASSERT_EQ(outcome.code, 0) << outcome.text;
-  EXPECT_NE(outcome.text.find("the report does without tradeoff/tradeoff.json"),
-            std::string::npos)
-      << outcome.text;
-  EXPECT_NE(outcome.text.find("schema 1"), std::string::npos) << outcome.text;
+  EXPECT_SAYS(outcome, "the report does without tradeoff/tradeoff.json");
+  EXPECT_SAYS(outcome, "schema 1");
   EXPECT_EQ(page().find("Accuracy and cost"), std::string::npos);
   testing::WriteText(folder / "t/base/tradeoff/tradeoff.json",
                      testing::ReadText(folder / "t/tradeoff.json"));
@@ -120,15 +105,11 @@ TEST(TradeoffCommand, MeasuresContinuesAndPredicts) {
 TEST(TradeoffCommand, VariesFitsOfSplats) {
   const TemporaryFolder folder;
   testing::WriteCapture(folder / "s", 6, "96x72");
-  std::vector<std::string> words{
-      "tradeoff",     folder / "s/truth",
-      "--out",        folder / "t",
-      "--parameters", "splat-steps,flow",
-      "--style",      testing::SourceDir() + "/assets/style_sunset.png",
-      "--presets",    "none",
-      "--repeats",    "1"};
-  for (const std::string& flag : testing::TinyFlags()) words.push_back(flag);
-  ProgramOutcome outcome = Regrade(words);
+  ProgramOutcome outcome =
+      Regrade({"tradeoff", folder / "s/truth", "--out", folder / "t", "--parameters",
+               "splat-steps,flow", "--style", testing::SourceDir() + "/assets/style_sunset.png",
+               "--presets", "none", "--repeats", "1"},
+              testing::TinyFlags());
   ASSERT_EQ(outcome.code, 0) << outcome.text;
   // Two bases, three values of the steps and four flows.
   const JsonValue result = ReadJsonFile(folder / "t/tradeoff.json");
@@ -137,7 +118,7 @@ TEST(TradeoffCommand, VariesFitsOfSplats) {
     EXPECT_TRUE(row.At("accuracy").IsNumber()) << DumpJson(row, -1);
   outcome = Regrade(
       {"tradeoff", "--predict", folder / "t/base", "--costs", folder / "t/tradeoff.json"});
-  EXPECT_NE(outcome.text.find("\nreconstruct"), std::string::npos) << outcome.text;
+  EXPECT_SAYS(outcome, "\nreconstruct");
 }
 
 TEST(TradeoffCommand, RefusesInvalidArguments) {

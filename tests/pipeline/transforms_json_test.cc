@@ -11,6 +11,8 @@
 
 #include "kernels/base/error.h"
 #include "kernels/synthetic/synthetic_scene.h"
+#include "tests/support/expect_error.h"
+#include "tests/support/temporary_folder.h"
 
 namespace regrade {
 namespace {
@@ -19,34 +21,23 @@ namespace fs = std::filesystem;
 
 class TransformsJson : public ::testing::Test {
  protected:
-  void SetUp() override {
-    folder_ = fs::path(::testing::TempDir()) /
-              ("transforms_" +
-               std::string(::testing::UnitTest::GetInstance()->current_test_info()->name()));
-    fs::remove_all(folder_);
-    fs::create_directories(folder_);
-    for (const char* name : {"a.png", "b.png", "c.jpg"}) std::ofstream(folder_ / name) << "x";
+  TransformsJson() {
+    for (const char* name : {"a.png", "b.png", "c.jpg"})
+      testing::WriteText(folder_ / name, "x");
   }
-  void TearDown() override { fs::remove_all(folder_); }
-
-  std::string path() const { return (folder_ / "transforms.json").string(); }
+  std::string path() const { return folder_ / "transforms.json"; }
   TransformsFile Read(const std::string& text, const PictureSizeFunction& size_of = {}) {
     std::ofstream(path()) << text;
     return ReadTransformsJson(path(), size_of);
   }
   // Reads, expects kInput, returns the message.
   std::string Refusal(const std::string& text) {
-    try {
-      Read(text);
-    } catch (const Error& error) {
-      EXPECT_EQ(error.code(), ExitCode::kInput) << error.what();
-      return error.what_failed() + " @ " + error.where();
-    }
-    ADD_FAILURE() << "accepted: " << text.substr(0, 200);
-    return "";
+    const Error error = testing::ErrorFrom([&] { Read(text); });
+    EXPECT_EQ(error.code(), ExitCode::kInput) << error.what() << text.substr(0, 200);
+    return error.what_failed() + " @ " + error.where();
   }
 
-  fs::path folder_;
+  const testing::TemporaryFolder folder_;
 };
 
 constexpr char kUnit[] = R"([[1,0,0,0],[0,1,0,0],[0,0,1,4],[0,0,0,1]])";

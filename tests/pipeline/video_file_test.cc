@@ -11,14 +11,15 @@
 #include "pipeline/images/video_reader.h"
 #include "pipeline/images/video_writer.h"
 #include "tests/pipeline/picture_corpus.h"
+#include "tests/support/expect_error.h"
 
 namespace regrade {
 namespace {
 
 using testing::Photo;
-using testing::ReadBytes;
-using testing::ScratchFolder;
-using testing::WriteBytes;
+using testing::ReadText;
+using testing::TemporaryFolder;
+using testing::WriteText;
 
 // Types of the file's top-level boxes, in order.
 std::vector<std::string> Boxes(const std::string& file) {
@@ -39,13 +40,13 @@ void WriteFilm(const std::string& path, int width, int height, int frames, int c
 }
 
 TEST(VideoFile, MovieHasItsIndexFirstAndAllFrames) {
-  const ScratchFolder scratch;
+  const TemporaryFolder scratch;
   const std::string path = scratch / "a b'c.mp4";
   VideoWriter writer(path, 96, 64, 24);
   for (int i = 0; i < 7; ++i) writer.Add(Photo(96, 64, i));
   EXPECT_FALSE(std::filesystem::exists(path));
   writer.Finish();
-  const std::vector<std::string> types = Boxes(ReadBytes(path));
+  const std::vector<std::string> types = Boxes(ReadText(path));
   ASSERT_GE(types.size(), 3u);
   EXPECT_EQ(types[0], "ftyp");
   EXPECT_EQ(types[1], "moov");
@@ -56,14 +57,14 @@ TEST(VideoFile, MovieHasItsIndexFirstAndAllFrames) {
 
 // Whole groups, and last ones of any length; a frame changes its own group alone.
 TEST(VideoFile, GroupsAreEncodedByThemselves) {
-  const ScratchFolder scratch;
+  const TemporaryFolder scratch;
   const auto film = [&](int first, int last, int changed) {
     const std::string path = scratch / "film.mp4";
     VideoWriter writer(path, 64, 48, 30);
     for (int i = first; i < last; ++i) writer.Add(Photo(64, 48, i == changed ? 1000 : i));
     writer.Finish();
     EXPECT_EQ(CountVideoFrames(path), last - first);
-    return ReadBytes(path);
+    return ReadText(path);
   };
   for (const int tail : {0, 1, 2, 3, 5}) film(0, kFilmGroup + tail, -1);
   const int frames = 2 * kFilmGroup + 7;
@@ -77,7 +78,7 @@ TEST(VideoFile, GroupsAreEncodedByThemselves) {
 }
 
 TEST(VideoFile, PartsJoinToTheFilmOfOneWriter) {
-  const ScratchFolder scratch;
+  const TemporaryFolder scratch;
   for (const double rate : {24., 30., 23.976})
     for (const int width : {64, 161}) {
       const auto film = [&](const char* name, int first, int last) {
@@ -92,7 +93,7 @@ TEST(VideoFile, PartsJoinToTheFilmOfOneWriter) {
       JoinFilms({film("a.mp4", 0, kFilmGroup), film("b.mp4", kFilmGroup, 3 * kFilmGroup),
                  film("c.mp4", 3 * kFilmGroup, frames)},
                 scratch / "joined.mp4");
-      EXPECT_EQ(ReadBytes(scratch / "joined.mp4"), ReadBytes(whole)) << width << " " << rate;
+      EXPECT_EQ(ReadText(scratch / "joined.mp4"), ReadText(whole)) << width << " " << rate;
     }
   const FilmPart first = {scratch / "a.mp4", kFilmGroup};
   const auto refused = [&](const char* name, int frames) {
@@ -104,19 +105,19 @@ TEST(VideoFile, PartsJoinToTheFilmOfOneWriter) {
   refused("absent.mp4", 3);
   refused("a.mp4", kFilmGroup + 1);
   refused("a.mp4", kFilmGroup - 1);
-  const std::string film = ReadBytes(first.path);
-  WriteBytes(scratch / "no_index.mp4", film.substr(0, 100));
+  const std::string film = ReadText(first.path);
+  WriteText(scratch / "no_index.mp4", film.substr(0, 100));
   refused("no_index.mp4", kFilmGroup);
   // Its index comes first.
-  WriteBytes(scratch / "cut.mp4", film.substr(0, film.size() / 2));
+  WriteText(scratch / "cut.mp4", film.substr(0, film.size() / 2));
   refused("cut.mp4", kFilmGroup);
-  WriteBytes(scratch / "playlist.mp4", "ffconcat version 1.0\nfile a.mp4\n");
+  WriteText(scratch / "playlist.mp4", "ffconcat version 1.0\nfile a.mp4\n");
   refused("playlist.mp4", kFilmGroup);
   EXPECT_FALSE(std::filesystem::exists(scratch / "j.mp4"));
 }
 
 TEST(VideoFile, OddSizesAndOtherChannelsAreTaken) {
-  const ScratchFolder scratch;
+  const TemporaryFolder scratch;
   for (const int channels : {1, 3, 4}) {
     const std::string path = scratch / std::to_string(channels) + ".mp4";
     WriteFilm(path, 65, 33, 3, channels);
@@ -125,11 +126,11 @@ TEST(VideoFile, OddSizesAndOtherChannelsAreTaken) {
 }
 
 TEST(VideoFile, EqualFramesGiveEqualBytesWithoutPathsOrDates) {
-  const ScratchFolder scratch;
+  const TemporaryFolder scratch;
   WriteFilm(scratch / "a.mp4", 64, 48, 5);
   WriteFilm(scratch / "another.mp4", 64, 48, 5);
-  const std::string film = ReadBytes(scratch / "a.mp4");
-  EXPECT_EQ(film, ReadBytes(scratch / "another.mp4"));
+  const std::string film = ReadText(scratch / "a.mp4");
+  EXPECT_EQ(film, ReadText(scratch / "another.mp4"));
   EXPECT_EQ(film.find(std::filesystem::path(scratch.path()).filename().string()),
             std::string::npos);
   EXPECT_EQ(film.find("regrade"), std::string::npos);
@@ -154,7 +155,7 @@ Image MovingSlope(int width, int height, int frame) {
 
 // Memory that nobody wrote has other bytes in each run.
 TEST(VideoFile, FilmsDoNotDependOnUnwrittenMemory) {
-  const ScratchFolder scratch;
+  const TemporaryFolder scratch;
   std::vector<std::string> films;
   for (const int fill : {1, 16, 64, 254}) {
     mallopt(M_PERTURB, fill);  // malloc's memory is filled with it
@@ -165,53 +166,42 @@ TEST(VideoFile, FilmsDoNotDependOnUnwrittenMemory) {
       writer.Finish();
     }
     mallopt(M_PERTURB, 0);
-    films.push_back(ReadBytes(path));
+    films.push_back(ReadText(path));
   }
   for (const std::string& film : films) EXPECT_TRUE(film == films[0]);
 }
 
 TEST(VideoFile, AFullDiskIsReportedAndTheOldFilmStays) {
-  const ScratchFolder scratch;
-  WriteBytes(scratch / "a.mp4", "old");
+  const TemporaryFolder scratch;
+  WriteText(scratch / "a.mp4", "old");
   rlimit before;
   ::getrlimit(RLIMIT_FSIZE, &before);
   const auto handler = ::signal(SIGXFSZ, SIG_IGN);
   const rlimit small{4096, before.rlim_max};
   ::setrlimit(RLIMIT_FSIZE, &small);
-  try {
-    WriteFilm(scratch / "a.mp4", 320, 240, 10);
-    ADD_FAILURE() << "no error";
-  } catch (const Error& error) {
-    EXPECT_EQ(error.code(), ExitCode::kResources);
-    EXPECT_EQ(error.where(), scratch / "a.mp4");
-    EXPECT_TRUE(testing::Contains(error.what_failed(), "File too large"));
-    EXPECT_FALSE(error.hint().empty());
-  }
+  EXPECT_REGRADE_ERROR(WriteFilm(scratch / "a.mp4", 320, 240, 10), ExitCode::kResources,
+                       (scratch / "a.mp4") + ": ", "File too large", "(");
   ::setrlimit(RLIMIT_FSIZE, &before);
   ::signal(SIGXFSZ, handler);
-  EXPECT_EQ(ReadBytes(scratch / "a.mp4"), "old");
+  EXPECT_EQ(ReadText(scratch / "a.mp4"), "old");
   EXPECT_EQ(std::distance(std::filesystem::directory_iterator(scratch.path()), {}), 1);
 }
 
 TEST(VideoFile, AnUnfinishedMovieLeavesNothing) {
-  const ScratchFolder scratch;
+  const TemporaryFolder scratch;
   { VideoWriter(scratch / "a.mp4", 64, 64, 24).Add(Photo(64, 64, 1)); }
   EXPECT_TRUE(std::filesystem::is_empty(scratch.path()));
 }
 
 TEST(VideoFile, AMissingFolderIsReported) {
-  const ScratchFolder scratch;
-  try {
-    VideoWriter writer(scratch / "none/a.mp4", 64, 64, 24);
-    FAIL();
-  } catch (const Error& error) {
-    EXPECT_EQ(error.code(), ExitCode::kResources);
-  }
+  const TemporaryFolder scratch;
+  EXPECT_REGRADE_ERROR(VideoWriter(scratch / "none/a.mp4", 64, 64, 24), ExitCode::kResources,
+                       "");
 }
 
 TEST(VideoFile, WhatIsNoVideoCountsAsNone) {
-  const ScratchFolder scratch;
-  WriteBytes(scratch / "a.mp4", "text");
+  const TemporaryFolder scratch;
+  WriteText(scratch / "a.mp4", "text");
   EXPECT_EQ(CountVideoFrames(scratch / "a.mp4"), -1);
 }
 

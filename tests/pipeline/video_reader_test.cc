@@ -15,8 +15,7 @@ namespace {
 using testing::ClipSpec;
 using testing::Contains;
 using testing::MeanDifference;
-using testing::ReadBytes;
-using testing::WriteBytes;
+using testing::ReadText;
 using testing::WriteClip;
 
 // Smooth, so that chroma at half resolution loses little; a bright square in the top left
@@ -193,7 +192,7 @@ TEST_F(VideoReaderTest, WideGamutsBecomeSrgb) {
 
 TEST_F(VideoReaderTest, F90_DamagedEmptyAndOtherFilesAreRefusedByName) {
   WriteClip(scratch_ / "whole.mp4", FilmFrames(60));
-  const std::string film = ReadBytes(scratch_ / "whole.mp4");
+  const std::string film = ReadText(scratch_ / "whole.mp4");
   EXPECT_TRUE(Contains(RefusalOf(Put("empty.mp4", "")), "empty file"));
   EXPECT_TRUE(Contains(RefusalOf(Put("text.mp4", "no film")), "cannot read this film"));
   EXPECT_TRUE(Contains(RefusalOf(scratch_ / "none.mp4"), "No such file"));
@@ -236,7 +235,7 @@ TEST_F(VideoReaderTest, F90_LongAndLargeFilmsEnd) {
   // A stream without an index, whose header says nothing of its length.
   WriteClip(scratch_ / "b.ts", FilmFrames(50), {.container = "mpegts"});
   std::string endless;
-  for (int i = 0; i < 40; ++i) endless += ReadBytes(scratch_ / "b.ts");
+  for (int i = 0; i < 40; ++i) endless += ReadText(scratch_ / "b.ts");
   EXPECT_TRUE(Contains(RefusalOf(Put("c.ts", endless), {.max_frames = 300}), "300 frames"));
 }
 

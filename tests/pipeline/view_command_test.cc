@@ -94,17 +94,13 @@ std::map<std::string, std::string> OtherFiles(const std::string& folder) {
 
 TEST(ViewCommand, ADroppedPictureBecomesAStyleAndAPathTheFilmOfRender) {
   const TemporaryFolder folder;
-  const auto regrade = [](const std::vector<std::string>& arguments) {
-    return testing::RunProgram(REGRADE_PROGRAM, arguments);
-  };
-  ASSERT_EQ(regrade({"synth", folder / "s", "--views", "6", "--size", "96x72"}).code, 0);
+  testing::Said({"synth", folder / "s", "--views", "6", "--size", "96x72"});
   std::vector<std::string> reconstruct{"reconstruct", folder / "s/truth", "--out",
                                        folder / "e"};
   for (const std::string& flag : testing::TinyFlags()) reconstruct.push_back(flag);
   // So long that the style can be watched: its network comes every 50 steps.
   *std::next(std::ranges::find(reconstruct, "--style-steps")) = "250";
-  const testing::ProgramOutcome made = regrade(reconstruct);
-  ASSERT_EQ(made.code, 0) << made.text;
+  testing::Said(reconstruct);
   const auto before = OtherFiles(folder / "");
 
   // The address comes before the scene, whose fit may still be at work, and the page with it.
@@ -170,7 +166,9 @@ TEST(ViewCommand, ADroppedPictureBecomesAStyleAndAPathTheFilmOfRender) {
   EXPECT_GT(film.size(), 1000u);
   EXPECT_EQ(BodyOf(view.Ask("GET", "/film")), film);
   WriteJsonFile(folder / "e/films/again.json", path);
-  ASSERT_EQ(regrade({"render", folder / "e", "--path", folder / "e/films/again.json"}).code, 0);
+  ASSERT_EQ(
+      testing::Regrade({"render", folder / "e", "--path", folder / "e/films/again.json"}).code,
+      0);
   EXPECT_EQ(ReadText(folder / "e/films/again.mp4"), film);
 
   // A damaged picture ends its job, with a reason, and nothing else.
@@ -188,15 +186,13 @@ TEST(ViewCommand, ADroppedPictureBecomesAStyleAndAPathTheFilmOfRender) {
 
 TEST(ViewCommand, EndsWhereNoSceneWillCome) {
   const TemporaryFolder folder;
-  const auto code_of = [&folder](const std::vector<std::string>& words) {
-    return testing::RunProgram(REGRADE_PROGRAM, words).code;
-  };
   fs::create_directories(folder / "no run");
-  EXPECT_EQ(code_of({"view", folder / "no run"}), 3);
+  EXPECT_EQ(testing::ExitCodeOf({"view", folder / "no run"}), 3);
   fs::create_directories(folder / "begun/.regrade");
-  EXPECT_EQ(code_of({"view", folder / "begun", "night"}), 3);  // a style before its scene
+  EXPECT_EQ(testing::ExitCodeOf({"view", folder / "begun", "night"}),
+            3);  // a style before its scene
   WriteFileAtomically(folder / "begun/field.npz", "damaged");
-  EXPECT_EQ(code_of({"view", folder / "begun"}), 3);
+  EXPECT_EQ(testing::ExitCodeOf({"view", folder / "begun"}), 3);
 }
 
 }  // namespace

@@ -14,6 +14,7 @@
 
 #include "kernels/base/error.h"
 #include "tests/support/data.h"
+#include "tests/support/expect_error.h"
 #include "tests/support/synthetic_model.h"
 
 namespace regrade {
@@ -52,20 +53,8 @@ class ColmapModelFile : public ::testing::Test {
     SetBytes(name, bytes);
   }
 
-  // The message of the refusal; fails the test if the model is accepted.
-  std::string Refusal() const {
-    try {
-      ReadColmapModel(folder_);
-    } catch (const Error& e) {
-      EXPECT_EQ(e.code(), ExitCode::kInput);
-      return e.what();
-    }
-    ADD_FAILURE() << "the damaged model was accepted";
-    return "";
-  }
   void ExpectRefusal(const std::string& part) const {
-    const std::string message = Refusal();
-    EXPECT_NE(message.find(part), std::string::npos) << message;
+    EXPECT_REGRADE_ERROR(ReadColmapModel(folder_), ExitCode::kInput, part);
   }
   void ExpectRewrittenRefusal(const std::string& part) const {
     WriteColmapModel(model_, folder_);
@@ -347,14 +336,8 @@ TEST(CaptureFromModel, H137_SizeMismatchIsRefused) {
   const ColmapModel model = MakeSyntheticModel({.images = 3});
   std::vector<StagedPhoto> photos = PhotosOf(model);
   std::swap(photos[1].width, photos[1].height);  // as with an ignored EXIF orientation
-  try {
-    CaptureFromModel(model, photos);
-    FAIL();
-  } catch (const Error& e) {
-    EXPECT_EQ(e.code(), ExitCode::kInput);
-    EXPECT_EQ(e.where(), "IMG 1.jpg");
-    EXPECT_NE(e.what_failed().find("480 x 640"), std::string::npos);
-  }
+  EXPECT_REGRADE_ERROR(CaptureFromModel(model, photos), ExitCode::kInput,
+                       "IMG 1.jpg: ", "480 x 640");
 }
 
 TEST(CaptureFromModel, UserNamesForForeignModels) {
@@ -372,12 +355,8 @@ TEST(CaptureFromModel, UserNamesForForeignModels) {
 
 TEST(ColmapModelData, FernComesWithoutImages) {
   REGRADE_NEED_DATA("llff_fern/sparse/0");
-  try {
-    ReadColmapModel(testing::DataPath("llff_fern/sparse/0"));
-    FAIL();
-  } catch (const Error& e) {
-    EXPECT_NE(e.where().find("images.bin"), std::string::npos);
-  }
+  EXPECT_REGRADE_ERROR(ReadColmapModel(testing::DataPath("llff_fern/sparse/0")),
+                       ExitCode::kInput, "images.bin");
 }
 
 }  // namespace

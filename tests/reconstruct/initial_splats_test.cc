@@ -6,6 +6,8 @@
 #include <cmath>
 #include <deque>
 
+#include "tests/support/pinhole.h"
+
 namespace regrade {
 namespace {
 
@@ -20,10 +22,7 @@ class FarStarts : public ::testing::Test {
     for (size_t v = 0; v < greys.size(); ++v) {
       photos.emplace_back(32, 24);
       for (float& value : photos.back().pixels) value = greys[v];
-      Camera camera;
-      camera.width = 32, camera.height = 24;
-      camera.fx = camera.fy = 30;
-      camera.cx = 16, camera.cy = 12;
+      Camera camera = testing::PinholeOf(32, 24, 30);
       camera.camera_from_world.translation = {0.1 * static_cast<double>(v), 0, 0.5};
       views.push_back({camera, &photos.back(), {}});
       for (int i = 0; i < 60; ++i)

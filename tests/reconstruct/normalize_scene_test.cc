@@ -8,24 +8,18 @@
 #include <cmath>
 
 #include "kernels/base/random.h"
+#include "kernels/scene/facing.h"
+#include "tests/support/pinhole.h"
 #include "tests/support/record_error.h"
 
 namespace regrade {
 namespace {
 
 Camera LookAt(const Vec3d& center, const Vec3d& target, const Vec3d& up) {
-  Camera camera;
-  camera.width = 640;
-  camera.height = 480;
-  camera.fx = camera.fy = 600;
-  camera.cx = 320;
-  camera.cy = 240;
+  Camera camera = testing::PinholeOf(640, 480, 600);
   const Vec3d forward = Normalized(target - center);
   const Vec3d right = Normalized(Cross(forward, up));
-  camera.camera_from_world.rotation.row[0] = right;
-  camera.camera_from_world.rotation.row[1] = Cross(forward, right);
-  camera.camera_from_world.rotation.row[2] = forward;
-  camera.camera_from_world.translation = -(camera.camera_from_world.rotation * center);
+  camera.camera_from_world = Facing(center, forward, right);
   return camera;
 }
 

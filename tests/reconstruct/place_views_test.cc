@@ -11,12 +11,11 @@
 #include "reconstruct/views/scene_up.h"
 #include "reconstruct/views/splat_extent.h"
 #include "tests/support/expect_error.h"
+#include "tests/support/pinhole.h"
 #include "tests/support/small_splats.h"
 
 namespace regrade {
 namespace {
-
-using testing::Draw;
 
 // Collects splats; flat ones are discs of `size` with that axis.
 class SceneMaker {
@@ -164,9 +163,7 @@ TEST(PlaceViews, ProbesOfManySplatsSeeTheSurface) {
   const RadianceField all = FieldOf(splats), some = FieldForProbes(splats, all, 2000);
   EXPECT_EQ(some.geometry->num_voxels(), 1800);
   EXPECT_EQ(FieldForProbes(splats, all, 9000).geometry->num_voxels(), 9000);
-  Camera camera;
-  camera.width = camera.height = 48;
-  camera.fx = camera.fy = 48, camera.cx = camera.cy = 24;
+  Camera camera = testing::PinholeOf(48, 48, 48);
   camera.camera_from_world.translation = {0, 0, 3};
   const RenderedView exact = FieldRenderer(all, Backend::kCpu).Render(camera),
                      probe = FieldRenderer(some, Backend::kCpu).Render(camera);

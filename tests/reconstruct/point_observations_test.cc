@@ -3,14 +3,13 @@
 
 #include <gtest/gtest.h>
 
+#include "tests/support/pinhole.h"
+
 namespace regrade {
 namespace {
 
 Camera CameraAt(double x) {
-  Camera camera;
-  camera.width = camera.height = 100;
-  camera.fx = camera.fy = 100;
-  camera.cx = camera.cy = 50;
+  Camera camera = testing::PinholeOf(100, 100, 100);
   camera.camera_from_world.rotation = Mat3d{};
   camera.camera_from_world.translation = {-x, 0, 0};
   return camera;

@@ -12,13 +12,13 @@
 #include "reconstruct/colmap/colmap_model.h"
 #include "reconstruct/colmap/colmap_strategies.h"
 #include "reconstruct/colmap/poses_from_photos.h"
+#include "tests/support/expect_error.h"
 #include "tests/support/synthetic_model.h"
 
 namespace regrade {
 namespace {
 
 namespace fs = std::filesystem;
-using testing::MakeSyntheticModel;
 using testing::StagedName;
 
 class Poses : public ::testing::Test {
@@ -53,14 +53,10 @@ class Poses : public ::testing::Test {
   // Expects an error with this code whose text contains all parts.
   void ExpectError(const std::string& behaviour, ExitCode code,
                    const std::vector<std::string>& parts, int photos = 10) {
-    try {
-      Run(behaviour, photos);
-      ADD_FAILURE() << behaviour << " was accepted";
-    } catch (const Error& e) {
-      EXPECT_EQ(static_cast<int>(e.code()), static_cast<int>(code)) << e.what();
-      for (const std::string& part : parts)
-        EXPECT_NE(std::string(e.what()).find(part), std::string::npos) << e.what();
-    }
+    const Error error = testing::ErrorFrom([&] { Run(behaviour, photos); });
+    EXPECT_EQ(static_cast<int>(error.code()), static_cast<int>(code)) << error.what();
+    for (const std::string& part : parts)
+      EXPECT_NE(std::string(error.what()).find(part), std::string::npos) << error.what();
     EXPECT_FALSE(fs::exists(folder_ / "sparse")) << "a refused model was returned";
   }
 
@@ -176,15 +172,9 @@ TEST_F(Poses, AbortEndsTheChild) {
 
 TEST_F(Poses, F46_MissingProgram) {
   options_.colmap = "no-such-colmap";
-  try {
-    PosesFromPhotos(Photos(10), {}, options_, folder_ / "work", folder_ / "sparse");
-    FAIL();
-  } catch (const Error& e) {
-    EXPECT_EQ(e.code(), ExitCode::kExternalProgram);
-    EXPECT_EQ(e.where(), "no-such-colmap");
-    EXPECT_NE(e.hint().find("apt install colmap"), std::string::npos);
-    EXPECT_NE(e.hint().find("--colmap"), std::string::npos);
-  }
+  EXPECT_REGRADE_ERROR(
+      PosesFromPhotos(Photos(10), {}, options_, folder_ / "work", folder_ / "sparse"),
+      ExitCode::kExternalProgram, "no-such-colmap: ", "apt install colmap", "--colmap");
 }
 
 TEST_F(Poses, F47_Versions) {

@@ -1,29 +1,20 @@
 // The installed COLMAP on a small real capture, from JPEG files to a Capture.
 #include <gtest/gtest.h>
 
-#include "kernels/base/error.h"
-#include "kernels/process/child_process.h"
 #include "pipeline/capture/ingest_photos.h"
 #include "reconstruct/colmap/poses_from_photos.h"
 #include "reconstruct/scene/scene_checks.h"
 #include "tests/support/data.h"
+#include "tests/support/run_program.h"
 #include "tests/support/temporary_folder.h"
 
 namespace regrade {
 namespace {
 
-bool HaveColmap() {
-  try {
-    return RunChild({.argv = {"colmap", "help"}}).Succeeded();
-  } catch (const Error&) {
-    return false;
-  }
-}
-
 // COLMAP is not deterministic, so the bounds are wide.
 TEST(RealColmap, Kermit) {
   REGRADE_NEED_DATA("kermit");
-  if (!HaveColmap()) GTEST_SKIP() << "no colmap here";
+  if (!testing::HaveColmap()) GTEST_SKIP() << "no colmap here";
   const testing::TemporaryFolder folder;
   const IngestResult ingest =
       IngestPhotos(testing::DataPath("kermit"), folder / "photos", {}, {});

@@ -9,6 +9,7 @@
 #include "reconstruct/scene/given_poses.h"
 #include "reconstruct/scene/lens_fold.h"
 #include "tests/support/expect_error.h"
+#include "tests/support/pinhole.h"
 #include "tests/support/record_error.h"
 #include "tests/support/synthetic_model.h"
 
@@ -128,10 +129,7 @@ TEST(SceneChecks, H140_ScaleDoesNotMatter) {
 }
 
 TEST(FoldRadius, IsWhereTheDistortionStopsGrowing) {
-  Camera camera;
-  camera.width = 640, camera.height = 480;
-  camera.fx = camera.fy = 500;
-  camera.cx = 320, camera.cy = 240;
+  Camera camera = testing::PinholeOf(640, 480, 500);
   EXPECT_EQ(FoldRadius(camera), 0);
   camera.lens = LensModel::kOpenCv;
   camera.distortion = {-0.2};

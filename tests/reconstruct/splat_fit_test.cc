@@ -290,7 +290,7 @@ TEST_F(SplatFit, ReproducesAHeldOutView) {
   SplatFitHooks hooks;
   double psnr = 0;
   hooks.measure = [&](SplatEngine* engine) {
-    psnr = testing::Psnr(engine->Render(cameras_[0]).color, photos_[0]);
+    psnr = DecibelsBetween(engine->Render(cameras_[0]).color, photos_[0]);
   };
   const SplatFitResult result = FitWith(hooks);
   EXPECT_EQ(result.rejected, 0);
@@ -299,7 +299,7 @@ TEST_F(SplatFit, ReproducesAHeldOutView) {
   Image background(48, 48);
   for (size_t i = 0; i < background.pixels.size(); ++i)
     background.pixels[i] = truth_.background[static_cast<int>(i % 3)];
-  EXPECT_GT(psnr, testing::Psnr(background, photos_[0]) + 12);
+  EXPECT_GT(psnr, DecibelsBetween(background, photos_[0]) + 12);
 }
 
 TEST_F(SplatFit, DegreeThreeIsFitted) {

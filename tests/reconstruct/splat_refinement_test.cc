@@ -119,10 +119,10 @@ TEST_F(SplatRefinement, FrozenSplatsKeepTheirBitsAndTheOthersTheirPlace) {
   double before = 0, after = 0;
   const auto engine = MakeCpuSplatEngine({});
   engine->SetState(start_);
-  before = testing::Psnr(engine->Render(cameras_[0]).color, photos_[0]);
+  before = DecibelsBetween(engine->Render(cameras_[0]).color, photos_[0]);
   SplatFitHooks hooks;
   hooks.measure = [&](SplatEngine* fitted) {
-    after = testing::Psnr(fitted->Render(cameras_[0]).color, photos_[0]);
+    after = DecibelsBetween(fitted->Render(cameras_[0]).color, photos_[0]);
   };
   const Splats refined = Refine(hooks, start_).splats;
   EXPECT_GT(after, before + 0.5);
@@ -164,7 +164,7 @@ TEST_F(SplatRefinement, ALastTurnBeginsGently) {
   SplatFitHooks keep;
   double before = 0, after = 0;
   keep.measure = [&](SplatEngine* fitted) {
-    before = testing::Psnr(fitted->Render(cameras_[0]).color, photos_[0]);
+    before = DecibelsBetween(fitted->Render(cameras_[0]).color, photos_[0]);
     fitted->ReadState([&](SplatFitState* state) { refined = RefinementOf(state->splats, 0); });
   };
   const SplatFitResult whole = Refine(keep, start_);
@@ -172,7 +172,7 @@ TEST_F(SplatRefinement, ALastTurnBeginsGently) {
   fit_.begin = 0.75f;
   SplatFitHooks measure;
   measure.measure = [&](SplatEngine* fitted) {
-    after = testing::Psnr(fitted->Render(cameras_[0]).color, photos_[0]);
+    after = DecibelsBetween(fitted->Render(cameras_[0]).color, photos_[0]);
   };
   const SplatFitResult last = Refine(measure, refined);
   EXPECT_EQ(4 * last.pixels, whole.pixels);

@@ -6,6 +6,8 @@
 
 #include <cmath>
 
+#include "kernels/scene/facing.h"
+
 namespace regrade {
 namespace {
 
@@ -24,10 +26,7 @@ std::vector<Silhouette> BallSilhouettes(double empty_angle) {
     camera.cx = camera.cy = 100;
     const Vec3d forward = Normalized(ball - center);
     const Vec3d right = Normalized(Cross(forward, Vec3d{0, 0, 1}));
-    camera.camera_from_world.rotation.row[0] = right;
-    camera.camera_from_world.rotation.row[1] = Cross(forward, right);
-    camera.camera_from_world.rotation.row[2] = forward;
-    camera.camera_from_world.translation = -(camera.camera_from_world.rotation * center);
+    camera.camera_from_world = Facing(center, forward, right);
     silhouette.alpha = Image(200, 200, 1);
     for (int y = 0; y < 200; ++y)
       for (int x = 0; x < 200; ++x) {

@@ -7,6 +7,7 @@
 
 #include "reconstruct/fit/fit_field.h"
 #include "tests/support/expect_error.h"
+#include "tests/support/pinhole.h"
 
 namespace regrade {
 namespace {
@@ -15,12 +16,7 @@ namespace {
 std::vector<TrainingView> OutwardViews(const Image& photo) {
   std::vector<TrainingView> views;
   for (const double angle : {0.0, 2 * M_PI / 3, 4 * M_PI / 3}) {
-    Camera camera;
-    camera.width = photo.width;
-    camera.height = photo.height;
-    camera.fx = camera.fy = photo.width;
-    camera.cx = photo.width / 2.0;
-    camera.cy = photo.height / 2.0;
+    Camera camera = testing::PinholeOf(photo.width, photo.height, photo.width);
     const double s = std::sin(angle), c = std::cos(angle);
     camera.camera_from_world = {{{{c, 0, -s}, {0, 1, 0}, {s, 0, c}}}, {0, 0, -0.5}};
     views.push_back({camera, &photo});

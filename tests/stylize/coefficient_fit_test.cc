@@ -99,8 +99,7 @@ TEST(CoefficientFit, NoOtherCoefficientsAreCloser) {
     for (size_t k = 0; k < wanted[i].pixels.size(); ++k)
       wanted[i].pixels[k] += static_cast<float>(0.1 * (static_cast<double>(i) - 1) +
                                                 0.1 * (RandomDouble(2, i, k) - 0.5));
-  CoefficientFitOptions options;
-  options.steps = 400;
+  CoefficientFitOptions options{.steps = 400};
   const RadianceField fitted =
       FitCoefficients(field, Cameras(), Difference(wanted, before), options);
   const double least = SquaredError(Renders(fitted), wanted);

@@ -9,11 +9,16 @@
 #include "kernels/base/error.h"
 #include "kernels/base/random.h"
 #include "kernels/image/color_spaces.h"
+#include "tests/support/expect_error.h"
 #include "tests/support/floating_point_traps.h"
 #include "tests/support/record_error.h"
+#include "tests/support/wavy_picture.h"
 
 namespace regrade {
 namespace {
+
+using testing::LargestDifference;
+using testing::OneColour;
 
 constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
 
@@ -36,32 +41,12 @@ const Mat3d kStyleMix{{{0.12, 0.05, 0}, {0.05, 0.08, 0.02}, {-0.04, 0.03, 0.09}}
 Image Photo(uint64_t seed = 1) { return Cloud(seed, {0.45, 0.5, 0.4}, kPhotoMix); }
 Image Style() { return Cloud(2, {0.6, 0.45, 0.3}, kStyleMix); }
 
-Image Constant(float r, float g, float b, int width = 16, int height = 16) {
-  Image image(width, height);
-  for (int64_t i = 0; i < image.num_pixels(); ++i) {
-    image.pixels[3 * i] = r;
-    image.pixels[3 * i + 1] = g;
-    image.pixels[3 * i + 2] = b;
-  }
-  return image;
-}
-
 StyleOptions Method(const std::string& method, bool scene_wide = false) {
-  StyleOptions options;
-  options.method = method;
-  options.scene_wide = scene_wide;
-  return options;
+  return {.method = method, .scene_wide = scene_wide};
 }
 
 Image Styled(const std::string& method, const Image& photo, const Image& style) {
   return MakeColorTransfer(Method(method), style)->Stylize(photo, 0);
-}
-
-double LargestDifference(const Image& a, const Image& b) {
-  double largest = 0;
-  for (size_t i = 0; i < a.pixels.size(); ++i)
-    largest = std::max<double>(largest, std::abs(a.pixels[i] - b.pixels[i]));
-  return largest;
 }
 
 TEST(ColorTransfer, MklMeetsMeanAndCovarianceOfTheStyle) {
@@ -120,7 +105,7 @@ TEST(ColorTransfer, H23_ConstantChannelsTakeTheStylesMean) {
   EXPECT_NEAR(result.mean.y, style.mean.y, 1e-4);
   EXPECT_LE(result.covariance(1, 1), 1e-6);
   // One colour: every channel is constant.
-  const Image flat = Styled("reinhard", Constant(0.2f, 0.5f, 0.9f), Style());
+  const Image flat = Styled("reinhard", OneColour(16, 16, {0.2, 0.5, 0.9}), Style());
   const Vec3d mean = SrgbFromLab(style.mean);
   for (int c = 0; c < 3; ++c)
     EXPECT_NEAR(
@@ -131,7 +116,7 @@ TEST(ColorTransfer, H23_ConstantChannelsTakeTheStylesMean) {
 
 TEST(ColorTransfer, H24_BlackPicturesStayFinite) {
   for (const char* method : {"mkl", "reinhard"}) {
-    const Image black = Constant(0, 0, 0);
+    const Image black = OneColour(16, 16, {0, 0, 0});
     for (const float v : Styled(method, black, Style()).pixels) ASSERT_TRUE(std::isfinite(v));
     for (const float v : Styled(method, Photo(), black).pixels)
       ASSERT_NEAR(v, 0,
@@ -142,11 +127,11 @@ TEST(ColorTransfer, H24_BlackPicturesStayFinite) {
 
 TEST(ColorTransfer, H7_AFlatStyleIsSaid) {
   for (const char* method : {"mkl", "reinhard"}) {
-    const auto stylizer = MakeColorTransfer(Method(method), Constant(0.2f, 0.4f, 0.6f));
+    const auto stylizer = MakeColorTransfer(Method(method), OneColour(16, 16, {0.2, 0.4, 0.6}));
     ASSERT_EQ(stylizer->Notices().size(), 1u);
     EXPECT_NE(stylizer->Notices()[0].find("single colour"), std::string::npos);
     EXPECT_LE(
-        LargestDifference(stylizer->Stylize(Photo(), 0), Constant(0.2f, 0.4f, 0.6f, 48, 40)),
+        LargestDifference(stylizer->Stylize(Photo(), 0), OneColour(48, 40, {0.2, 0.4, 0.6})),
         1e-6);
     EXPECT_TRUE(MakeColorTransfer(Method(method), Style())->Notices().empty());
   }
@@ -170,28 +155,17 @@ TEST(ColorTransfer, H29_FewNansPassManyStopWithTheViewsName) {
     const Image styled = stylizer->Stylize(photo, 7);
     EXPECT_EQ(CountNotFinite(styled, ""), 19);
     photo.at(30, 30)[0] = std::numeric_limits<float>::infinity();
-    try {
-      stylizer->Stylize(photo, 7);
-      FAIL() << "no error";
-    } catch (const Error& e) {
-      EXPECT_EQ(e.where(), "view 7");
-      EXPECT_EQ(e.what_failed(), "20 of 1920 pixels are not finite numbers");
-    }
+    EXPECT_REGRADE_ERROR(stylizer->Stylize(photo, 7), ExitCode::kInput,
+                         "view 7: 20 of 1920 pixels are not finite numbers");
   }
 }
 
 TEST(ColorTransfer, H27_AStyledViewKeepsItsSize) {
   const Image view(16, 9);
   EXPECT_EQ(CheckStyledView(view, Image(16, 9), "view 3"), 0);
-  for (const Image& styled : {Image(16, 8), Image(15, 9), Image(16, 9, 4)}) {
-    try {
-      CheckStyledView(view, styled, "view 3");
-      FAIL() << "no error";
-    } catch (const Error& e) {
-      EXPECT_EQ(e.code(), ExitCode::kExternalProgram);
-      EXPECT_EQ(e.where(), "view 3");
-    }
-  }
+  for (const Image& styled : {Image(16, 8), Image(15, 9), Image(16, 9, 4)})
+    EXPECT_REGRADE_ERROR(CheckStyledView(view, styled, "view 3"), ExitCode::kExternalProgram,
+                         "view 3: ");
 }
 
 TEST(ColorTransfer, H30_ASceneWideMapIsTheSameInAllViews) {
@@ -232,12 +206,8 @@ TEST(ColorTransfer, AlphaStaysAndTransparentColoursAreIgnored) {
   EXPECT_EQ(styled.at(3, photo.height + 2)[3], 0);
   for (int c = 0; c < 3; ++c) EXPECT_NEAR(styled.at(3, 5)[c], plain.at(3, 5)[c], 1e-6);
   // Nothing but air: the error knows the view.
-  try {
-    MakeColorTransfer(Method("mkl"), Style())->Stylize(Image(4, 4, 4), 12);
-    FAIL() << "no error";
-  } catch (const Error& e) {
-    EXPECT_EQ(e.where(), "view 12");
-  }
+  EXPECT_REGRADE_ERROR(MakeColorTransfer(Method("mkl"), Style())->Stylize(Image(4, 4, 4), 12),
+                       ExitCode::kInput, "view 12: ");
 }
 
 TEST(ColorTransfer, ASceneWideMapNeedsTheScene) {

@@ -14,29 +14,10 @@ using namespace testing;  // NOLINT: a test
 
 // --- the gradient
 
-// Algorithm 1's loss and its gradient by the network's own parameters.
-double PlainGradient(const LipschitzNetwork& network, const RadianceField& field,
-                     const StyleRays& batch, double scale, double view_weight,
-                     std::vector<double>* gradient) {
-  const RayWeights weights = ComputeRayWeights(
-      *field.geometry, {batch.rays.data(), static_cast<int64_t>(batch.rays.size())},
-      MarchOptions{}, field.near_clip);
-  std::vector<Vec3d> directions, targets;
-  for (size_t r = 0; r < batch.rays.size(); ++r) {
-    directions.push_back(batch.rays[r].direction.Cast<double>());
-    targets.push_back(batch.targets[r].Cast<double>());
-  }
-  DenseNetwork<double> d_effective;
-  for (int l = 0; l < kNetworkLayers; ++l)
-    d_effective.layers.emplace_back(network.Outputs(l), network.Inputs(l));
-  const double loss = Algorithm1<double>(network, field, weights, directions, targets, scale,
-                                         view_weight, &d_effective);
-  if (gradient != nullptr) network.AddGradient(d_effective, gradient);
-  return loss;
-}
-
-std::vector<double> NoGradient() {
-  return std::vector<double>(static_cast<size_t>(LipschitzNetwork().NumParameters()));
+RayWeights WeightsOf(const RadianceField& field, const StyleRays& batch) {
+  return ComputeRayWeights(*field.geometry,
+                           {batch.rays.data(), static_cast<int64_t>(batch.rays.size())},
+                           MarchOptions{}, field.near_clip);
 }
 
 TEST(Algorithm1, H46_GradientAgainstRichardson) {
@@ -45,39 +26,8 @@ TEST(Algorithm1, H46_GradientAgainstRichardson) {
   LipschitzNetwork network = RandomNetwork(90);
   network.data().has_base = true;
   network.data().base = SomeMap();
-  std::vector<double> gradient = NoGradient();
-  PlainGradient(network, field, batch, 1.0, 0.7, &gradient);
-  // Parameters are float: steps are powers of two, so that both ends are exact. Every layer's
-  // W, b and K; u and v stay, as in the adjoint.
-  for (int l = 0; l < kNetworkLayers; ++l) {
-    const int64_t first = network.weight(l) - network.weight(0);
-    const int64_t bias = network.bias(l) - network.weight(0);
-    const int64_t k = &network.k(l) - network.weight(0);
-    for (const int64_t at : {first, first + 37, bias + 3, k}) {
-      float& value = network.data().parameters[static_cast<size_t>(at)];
-      const float before = value = std::ldexp(std::round(std::ldexp(value, 14)), -14);
-      std::vector<double> analytic = NoGradient();
-      PlainGradient(network, field, batch, 1.0, 0.7, &analytic);
-      const auto central = [&](float h) {
-        value = before + h;
-        const double plus = PlainGradient(network, field, batch, 1.0, 0.7, nullptr);
-        value = before - h;
-        const double minus = PlainGradient(network, field, batch, 1.0, 0.7, nullptr);
-        value = before;
-        return (plus - minus) / (2 * static_cast<double>(h));
-      };
-      // Two Richardson steps: error O(h^6).
-      const double h0 = central(0x1p-6f), h1 = central(0x1p-7f), h2 = central(0x1p-8f);
-      const double r0 = (4 * h1 - h0) / 3, r1 = (4 * h2 - h1) / 3;
-      const double numeric = (16 * r1 - r0) / 15;
-      EXPECT_NEAR(analytic[static_cast<size_t>(at)], numeric,
-                  testing::RecordDigits("gradient through sigma, W, b and K",
-                                        testing::Computed::kDouble,
-                                        analytic[static_cast<size_t>(at)] - numeric, 2e-8,
-                                        std::max(1.0, std::abs(numeric))))
-          << "layer " << l << " parameter " << at - first;
-    }
-  }
+  ExpectRichardson(network, field, WeightsOf(field, batch), batch, -6,
+                   "gradient through sigma, W, b and K");
 }
 
 void ExpectAlgorithm1(const RadianceField& field, const LipschitzNetwork& network,
@@ -87,7 +37,8 @@ void ExpectAlgorithm1(const RadianceField& field, const LipschitzNetwork& networ
   std::vector<double> gradient = NoGradient(), expected = NoGradient();
   const AggregationResult result = aggregation.Run(network, batch, &gradient);
   const double scale = 1 / (3.0 * static_cast<double>(batch.rays.size()));
-  const double loss = PlainGradient(network, field, batch, scale, view_weight, &expected);
+  const double loss = PlainGradient(network, field, WeightsOf(field, batch), batch, scale,
+                                    view_weight, &expected);
   EXPECT_NEAR(result.loss, loss, 1e-5 * loss);
   EXPECT_LE(RelativeDifference(gradient, expected),
             testing::RecordDigits("by voxels against Algorithm 1 in double",
@@ -146,14 +97,15 @@ TEST(GradientAggregation, BackgroundSpheresAreInAlgorithm1sGradient) {
   const AggregationResult result =
       GradientAggregation(field, {.view_weight = 0.5}).Run(network, batch, &gradient);
   const double scale = 1 / (3.0 * static_cast<double>(batch.rays.size()));
-  const double loss = PlainGradient(network, field, batch, scale, 0.5, &expected);
+  const double loss =
+      PlainGradient(network, field, WeightsOf(field, batch), batch, scale, 0.5, &expected);
   EXPECT_NEAR(result.loss, loss, 1e-5 * loss);
   EXPECT_LE(RelativeDifference(gradient, expected),
             testing::RecordDigits("with spheres against Algorithm 1 in double",
                                   testing::Computed::kFloat,
                                   RelativeDifference(gradient, expected), 1e-5));
   // The layers contribute: the ball alone has another gradient.
-  PlainGradient(network, Ball(8), batch, scale, 0.5, &box);
+  PlainGradient(network, Ball(8), WeightsOf(Ball(8), batch), batch, scale, 0.5, &box);
   EXPECT_GT(RelativeDifference(box, expected), 0.01);
 }
 

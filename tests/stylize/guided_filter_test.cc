@@ -6,26 +6,16 @@
 #include <cmath>
 
 #include "kernels/base/random.h"
+#include "tests/support/pictures.h"
+#include "tests/support/wavy_picture.h"
 
 namespace regrade {
 namespace {
 
-Image Noise(uint64_t seed, int width, int height) {
-  Image image(width, height);
-  for (size_t i = 0; i < image.pixels.size(); ++i)
-    image.pixels[i] = static_cast<float>(RandomDouble(seed, 0, i));
-  return image;
-}
-
-double LargestDifference(const Image& a, const Image& b) {
-  double largest = 0;
-  for (size_t i = 0; i < a.pixels.size(); ++i)
-    largest = std::max<double>(largest, std::abs(a.pixels[i] - b.pixels[i]));
-  return largest;
-}
+using testing::LargestDifference;
 
 TEST(GuidedFilter, AnAffineMapOfTheGuideComesBack) {
-  const Image guide = Noise(1, 50, 40);
+  const Image guide = testing::NoiseImage(50, 40, 1);
   Image picture(50, 40);
   for (int64_t i = 0; i < guide.num_pixels(); ++i) {
     const float* g = &guide.pixels[3 * i];
@@ -42,7 +32,7 @@ TEST(GuidedFilter, WindowsAreMeansOverReflectedPictures) {
   // A constant guide leaves the mean of means: compared with the sums written out.
   Image guide(9, 7);
   std::fill(guide.pixels.begin(), guide.pixels.end(), 0.3f);
-  const Image picture = Noise(2, 9, 7);
+  const Image picture = testing::NoiseImage(9, 7, 2);
   for (const int radius : {1, 3, 12}) {  // 12: wider than the picture
     const auto reflected = [](int i, int n) {
       while (i < 0 || i >= n) i = i < 0 ? -1 - i : 2 * n - 1 - i;

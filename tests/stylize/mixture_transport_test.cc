@@ -15,12 +15,17 @@
 #include "stylize/image/monge_kantorovich.h"
 #include "stylize/image/sample_colors.h"
 #include "stylize/image/transport_plan.h"
+#include "tests/support/expect_error.h"
 #include "tests/support/floating_point_traps.h"
 #include "tests/support/record_error.h"
 #include "tests/support/threads.h"
+#include "tests/support/wavy_picture.h"
 
 namespace regrade {
 namespace {
+
+using testing::LargestDifference;
+using testing::OneColour;
 
 struct Group {
   double share;
@@ -49,29 +54,11 @@ const std::vector<Group> kSkyAndGrass = {{0.4, {0.5, 0.65, 0.85}, 0.04},
 const std::vector<Group> kDusk = {{0.4, {0.8, 0.55, 0.5}, 0.05},
                                   {0.6, {0.25, 0.3, 0.25}, 0.03}};
 
-Image Constant(float value) {
-  Image image(16, 16);
-  for (float& v : image.pixels) v = value;
-  return image;
-}
-
-StyleOptions Gmm(double max_slope = 4) {
-  StyleOptions options;
-  options.method = "gmm";
-  options.max_slope = max_slope;
-  return options;
-}
+StyleOptions Gmm(double max_slope = 4) { return {.method = "gmm", .max_slope = max_slope}; }
 
 Image Styled(const Image& photo, const Image& style, const StyleOptions& options = Gmm()) {
   return MakeMixtureTransfer(options, style, SampleColors(photo, "photo", kMixtureSample))
       ->Stylize(photo, 0);
-}
-
-double LargestDifference(const Image& a, const Image& b) {
-  double largest = 0;
-  for (size_t i = 0; i < a.pixels.size(); ++i)
-    largest = std::max<double>(largest, std::abs(a.pixels[i] - b.pixels[i]));
-  return largest;
 }
 
 TEST(TransportPlan, EqualWeightsAgreeWithTheBestOfAllPermutations) {
@@ -235,12 +222,13 @@ TEST(MixtureTransport, H180_BothSidesEqualGiveTheIdentity) {
 TEST(MixtureTransport, H181_OneColourTakesTheStylesMean) {
   const Image style = Groups(4, kDusk);
   const Vec3d mean = MeasureColor(style).mean;
-  const Image styled = Styled(Constant(0.4f), style);
+  const Image styled = Styled(OneColour(16, 16, {0.4, 0.4, 0.4}), style);
   for (int64_t i = 0; i < styled.num_pixels(); ++i)
     for (int c = 0; c < 3; ++c) ASSERT_NEAR(styled.pixels[3 * i + c], mean[c], 1e-5);
   // And a style of one colour is taken, to the floor of two steps, and said.
-  const auto flat = MakeMixtureTransfer(
-      Gmm(), Constant(0.25f), SampleColors(Groups(3, kSkyAndGrass), "", kMixtureSample));
+  const auto flat =
+      MakeMixtureTransfer(Gmm(), OneColour(16, 16, {0.25, 0.25, 0.25}),
+                          SampleColors(Groups(3, kSkyAndGrass), "", kMixtureSample));
   EXPECT_EQ(flat->Notices().at(0), kFlatStyleNotice);
   for (const float v : flat->Stylize(Groups(3, kSkyAndGrass), 0).pixels)
     ASSERT_NEAR(v, 0.25, 6 * 2.0 / 255);
@@ -292,7 +280,7 @@ TEST(MixtureTransport, H184_APartWithoutColoursIsLeftOutOfAFitAndKeptOfAPrior) {
   double least = 1;
   for (const GaussianPart& part : adapted) least = std::min(least, part.weight);
   EXPECT_NEAR(least, kPriorShare / (1 + kPriorShare) * 0.6, 0.002);
-  const Image black = Constant(0);
+  const Image black = OneColour(16, 16, {0, 0, 0});
   const auto stylizer = MakeMixtureTransfer(
       Gmm(), Groups(4, kDusk), SampleColors(Groups(3, kSkyAndGrass), "", kMixtureSample));
   EXPECT_EQ(CheckStyledView(black, stylizer->Stylize(black, 0), "v"), 0);
@@ -338,12 +326,7 @@ TEST(MixtureTransport, H29_FewNansPassManyStopWithTheViewsName) {
       MakeMixtureTransfer(Gmm(), Groups(4, kDusk), SampleColors(photo, "", kMixtureSample));
   EXPECT_EQ(CountNotFinite(stylizer->Stylize(photo, 7), ""), 1);
   for (int x = 0; x < 64; ++x) photo.at(x, 5)[0] = std::numeric_limits<float>::quiet_NaN();
-  try {
-    stylizer->Stylize(photo, 7);
-    FAIL() << "no error";
-  } catch (const Error& e) {
-    EXPECT_EQ(e.where(), "view 7");
-  }
+  EXPECT_REGRADE_ERROR(stylizer->Stylize(photo, 7), ExitCode::kInput, "view 7: ");
 }
 
 }  // namespace

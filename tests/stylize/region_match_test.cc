@@ -17,7 +17,6 @@
 namespace regrade {
 namespace {
 
-using testing::Plain;
 using testing::SkyAndGround;
 using testing::TwoRegions;
 
@@ -84,7 +83,7 @@ TEST(RegionMatch, H189_AStyleThatNothingResemblesHasNoWeight) {
   const TwoRegions scene = SkyAndGround(3, 160, 120);
   const std::vector<Image> styles = {testing::SkyAndGroundStyles()[0],
                                      testing::SkyAndGroundStyles()[1],
-                                     Plain(60, 40, {0.1, 0.9, 0.1})};
+                                     testing::OneColour(60, 40, {0.1, 0.9, 0.1})};
   const RegionMatch match = Match(RegionFeatures("", styles), scene.photos, styles);
   EXPECT_EQ(match.weight_of_style[2], 0);
   // A view that shows one region alone: the others have nothing of it.
@@ -116,13 +115,15 @@ TEST(RegionMatch, H189_AViewShowsARegionByMoreThanAHalfOrNotAtAll) {
 }
 
 TEST(RegionMatch, H6_PicturesOfOneColourAreMatched) {
-  const std::vector<Image> styles = {Plain(64, 48, {0.2, 0.3, 0.8}),
-                                     Plain(64, 48, {0.8, 0.5, 0.2})};
+  const std::vector<Image> styles = {testing::OneColour(64, 48, {0.2, 0.3, 0.8}),
+                                     testing::OneColour(64, 48, {0.8, 0.5, 0.2})};
   const RegionFeatures features("", styles);
-  const RegionMatch match = Match(features, {Plain(80, 60, {0.3, 0.4, 0.8})}, styles);
+  const RegionMatch match =
+      Match(features, {testing::OneColour(80, 60, {0.3, 0.4, 0.8})}, styles);
   EXPECT_NEAR(match.weight_of_style[0], 1, 1e-9);
   EXPECT_EQ(match.Unsure(), 0);
-  for (const Image& region : RegionCoverage(match, features, Plain(80, 60, {0, 0, 0})))
+  for (const Image& region :
+       RegionCoverage(match, features, testing::OneColour(80, 60, {0, 0, 0})))
     for (const float v : region.pixels) ASSERT_TRUE(v == 0 || v == 1) << v;
 }
 

@@ -22,24 +22,8 @@ using namespace testing;  // NOLINT: a test
 
 // --- gradient
 
-double PlainGradient(const LipschitzNetwork& network, const RadianceField& field,
-                     const StyleRays& batch, double scale, double view_weight,
-                     std::vector<double>* gradient) {
-  const RayWeights weights =
-      MakeRayWeigher(*field.geometry, field.near_clip, MarchOptions{})->Weigh(batch);
-  std::vector<Vec3d> directions(batch.rays.size()), targets;  // splats have their own
-  for (const Vec3f& target : batch.targets) targets.push_back(target.Cast<double>());
-  DenseNetwork<double> d_effective;
-  for (int l = 0; l < kNetworkLayers; ++l)
-    d_effective.layers.emplace_back(network.Outputs(l), network.Inputs(l));
-  const double loss = Algorithm1<double>(network, field, weights, directions, targets, scale,
-                                         view_weight, &d_effective);
-  if (gradient != nullptr) network.AddGradient(d_effective, gradient);
-  return loss;
-}
-
-std::vector<double> NoGradient(int basis = 9) {
-  return std::vector<double>(static_cast<size_t>(LipschitzNetwork(basis).NumParameters()));
+RayWeights WeightsOf(const RadianceField& field, const StyleRays& batch) {
+  return MakeRayWeigher(*field.geometry, field.near_clip, MarchOptions{})->Weigh(batch);
 }
 
 LipschitzNetwork BasedNetwork(uint64_t stream, int basis = 9) {
@@ -59,32 +43,8 @@ TEST_P(SplatStyleOf, GradientAgainstRichardson) {
   const StyleRays batch = SomeRays(2, 6);
   LipschitzNetwork network = BasedNetwork(90, basis);
   network.data().base.offset = {0.2, 0.2, 0.2};  // no clamp begins or ends within a step
-  for (int l = 0; l < kNetworkLayers; ++l) {
-    const int64_t first = network.weight(l) - network.weight(0);
-    const int64_t bias = network.bias(l) - network.weight(0);
-    for (const int64_t at : {first + 37, bias + 3, &network.k(l) - network.weight(0)}) {
-      float& value = network.data().parameters[static_cast<size_t>(at)];
-      const float before = value = std::ldexp(std::round(std::ldexp(value, 14)), -14);
-      std::vector<double> analytic = NoGradient(basis);
-      PlainGradient(network, field, batch, 1.0, 0.7, &analytic);
-      const auto central = [&](float h) {
-        value = before + h;
-        const double plus = PlainGradient(network, field, batch, 1.0, 0.7, nullptr);
-        value = before - h;
-        const double minus = PlainGradient(network, field, batch, 1.0, 0.7, nullptr);
-        value = before;
-        return (plus - minus) / (2 * static_cast<double>(h));
-      };
-      const double h0 = central(0x1p-8f), h1 = central(0x1p-9f), h2 = central(0x1p-10f);
-      const double r0 = (4 * h1 - h0) / 3, r1 = (4 * h2 - h1) / 3;
-      const double numeric = (16 * r1 - r0) / 15, is = analytic[static_cast<size_t>(at)];
-      EXPECT_NEAR(
-          is, numeric,
-          RecordDigits("gradient of splats through sigma, W, b and K", Computed::kDouble,
-                       is - numeric, 2e-8, std::max(1.0, std::abs(numeric))))
-          << "layer " << l;
-    }
-  }
+  ExpectRichardson(network, field, WeightsOf(field, batch), batch, -8,
+                   "gradient of splats through sigma, W, b and K");
 }
 
 TEST_P(SplatStyleOf, EqualsAlgorithm1) {
@@ -98,7 +58,8 @@ TEST_P(SplatStyleOf, EqualsAlgorithm1) {
   EXPECT_GT(result.touched_voxels, 100);
   EXPECT_LT(result.touched_voxels, 3000);
   const double scale = 1 / (3.0 * static_cast<double>(batch.rays.size()));
-  const double loss = PlainGradient(network, field, batch, scale, 0.7, &expected);
+  const double loss =
+      PlainGradient(network, field, WeightsOf(field, batch), batch, scale, 0.7, &expected);
   EXPECT_NEAR(result.loss, loss, 1e-5 * loss);
   EXPECT_LE(RelativeDifference(gradient, expected),
             RecordDigits("gradient of splats", Computed::kFloat,

@@ -8,10 +8,7 @@ namespace regrade {
 namespace {
 
 StyleOptions Method(const std::string& method, bool scene_wide = false) {
-  StyleOptions options;
-  options.method = method;
-  options.scene_wide = scene_wide;
-  return options;
+  return {.method = method, .scene_wide = scene_wide};
 }
 
 TEST(StyleMethod, KindAndWhatFollowsTheColon) {

@@ -10,6 +10,7 @@
 #include "kernels/base/random.h"
 #include "kernels/field/cpu/render_view.h"
 #include "kernels/field/spherical_harmonics.h"
+#include "tests/support/pinhole.h"
 #include "tests/support/record_error.h"
 
 namespace regrade {
@@ -87,8 +88,7 @@ TEST(VoxelResidual, AGridsNeighboursAreTheNextVoxels) {
 TEST(VoxelResidual, GradientIsTheEnergysDerivativeInDouble) {
   const VoxelGraph graph = GraphOf(Block(4, 2));
   const ResidualRays rays = SomeRays(graph, 40, graph.voxels, 3);
-  ResidualOptions options;
-  options.pull = 0.01;
+  ResidualOptions options{.pull = 0.01};
   const std::vector<Vec3d> x = RandomColors(graph.voxels, 0.1, 5),
                            along = RandomColors(graph.voxels, 1, 6);
   std::vector<Vec3d> gradient(x.size());
@@ -172,9 +172,7 @@ TEST(VoxelResidual, DoesNotDependOnTheThreads) {
 
 TEST(VoxelResidual, RaysSeeWhatTheRendererSees) {
   RadianceField field = Block(6);
-  Camera camera;
-  camera.width = 12, camera.height = 8;
-  camera.fx = camera.fy = 14, camera.cx = 6, camera.cy = 4;
+  Camera camera = testing::PinholeOf(12, 8, 14);
   camera.camera_from_world.translation = {0.1, -0.05, 3};
   ResidualRays rays;
   AddResidualRays(field, camera, Image(12, 8), 1 << 20, 0, &rays);

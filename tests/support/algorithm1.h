@@ -2,7 +2,11 @@
 // The specification that gradient_aggregation.h is held to; see EQ(liprf-loss) there.
 #pragma once
 
+#include <gtest/gtest.h>
+
 #include <algorithm>
+#include <cmath>
+#include <string>
 #include <vector>
 
 #include "kernels/field/ray_weights.h"
@@ -10,6 +14,8 @@
 #include "kernels/field/trilinear.h"
 #include "stylize/field/lipschitz_network.h"
 #include "stylize/field/view_penalty.h"
+#include "tests/support/record_error.h"
+#include "tests/support/styled_ball.h"
 
 namespace regrade {
 
@@ -118,5 +124,70 @@ T Algorithm1(const LipschitzNetwork& network, const RadianceField& field,
                  &d_sh[static_cast<size_t>(v) * terms], d_effective, static_cast<T*>(nullptr));
   return loss;
 }
+
+namespace testing {
+
+inline std::vector<double> NoGradient(int basis = 9) {
+  return std::vector<double>(static_cast<size_t>(LipschitzNetwork(basis).NumParameters()));
+}
+
+// Algorithm 1's loss and its gradient by the network's own parameters.
+inline double PlainGradient(const LipschitzNetwork& network, const RadianceField& field,
+                            const RayWeights& weights, const StyleRays& batch, double scale,
+                            double view_weight, std::vector<double>* gradient) {
+  std::vector<Vec3d> directions, targets;  // samples of splats have their own directions
+  for (size_t r = 0; r < batch.targets.size(); ++r) {
+    directions.push_back(batch.rays.empty() ? Vec3d{} : batch.rays[r].direction.Cast<double>());
+    targets.push_back(batch.targets[r].Cast<double>());
+  }
+  DenseNetwork<double> d_effective;
+  for (int l = 0; l < kNetworkLayers; ++l)
+    d_effective.layers.emplace_back(network.Outputs(l), network.Inputs(l));
+  const double loss = Algorithm1<double>(network, field, weights, directions, targets, scale,
+                                         view_weight, &d_effective);
+  if (gradient != nullptr) network.AddGradient(d_effective, gradient);
+  return loss;
+}
+
+// That gradient against differences in steps of 2^step and smaller ones, for some of every
+// layer's W, b and K; u and v stay, as in the adjoint.
+inline void ExpectRichardson(LipschitzNetwork network, const RadianceField& field,
+                             const RayWeights& weights, const StyleRays& batch, int step,
+                             const std::string& what) {
+  const auto loss = [&](std::vector<double>* gradient) {
+    return PlainGradient(network, field, weights, batch, 1.0, 0.7, gradient);
+  };
+  for (int l = 0; l < kNetworkLayers; ++l) {
+    const int64_t first = network.weight(l) - network.weight(0);
+    const int64_t bias = network.bias(l) - network.weight(0);
+    const int64_t k = &network.k(l) - network.weight(0);
+    for (const int64_t at : {first, first + 37, bias + 3, k}) {
+      // Parameters are float: steps are powers of two, so that both ends are exact.
+      float& value = network.data().parameters[static_cast<size_t>(at)];
+      const float before = value = std::ldexp(std::round(std::ldexp(value, 14)), -14);
+      std::vector<double> analytic = NoGradient(network.row().basis);
+      loss(&analytic);
+      const auto central = [&](int exponent) {
+        const float h = std::ldexp(1.0f, exponent);
+        value = before + h;
+        const double plus = loss(nullptr);
+        value = before - h;
+        const double minus = loss(nullptr);
+        value = before;
+        return (plus - minus) / (2 * static_cast<double>(h));
+      };
+      // Two Richardson steps: error O(h^6).
+      const double h0 = central(step), h1 = central(step - 1), h2 = central(step - 2);
+      const double r0 = (4 * h1 - h0) / 3, r1 = (4 * h2 - h1) / 3;
+      const double numeric = (16 * r1 - r0) / 15, is = analytic[static_cast<size_t>(at)];
+      EXPECT_NEAR(is, numeric,
+                  RecordDigits(what, Computed::kDouble, is - numeric, 2e-8,
+                               std::max(1.0, std::abs(numeric))))
+          << "layer " << l << " parameter " << at - first;
+    }
+  }
+}
+
+}  // namespace testing
 
 }  // namespace regrade

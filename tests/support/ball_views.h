@@ -5,14 +5,15 @@
 
 #include <cmath>
 #include <cstring>
-#include <memory>
 #include <vector>
 
 #include "kernels/base/error.h"
 #include "kernels/field/cpu/render_view.h"
 #include "kernels/field/render.h"
+#include "kernels/image/decibels.h"
+#include "kernels/scene/facing.h"
 #include "reconstruct/fit/fit_field.h"
-#include "tests/support/psnr.h"
+#include "tests/support/pinhole.h"
 #include "tests/support/small_field.h"
 #include "tests/support/threads.h"
 
@@ -22,40 +23,20 @@ namespace regrade::testing {
 class FitField : public ::testing::Test {
  protected:
   void SetUp() override {
-    RadianceField truth = RandomField({24, 24, 24}, 1, 1.0, 5);
-    auto geometry = std::make_shared<Geometry>(*truth.geometry);
-    geometry->frame.center = {0, 0, 0};
-    geometry->frame.radius = {1, 1, 1};
-    for (int64_t v = 0; v < geometry->links.size(); ++v) {
-      const Vec3f p =
-          geometry->frame.WorldOf({static_cast<float>(v / 576), static_cast<float>(v / 24 % 24),
-                                   static_cast<float>(v % 24)});
-      const float inside = 0.6f - Norm(p);
-      geometry->density[v] = inside > 0 ? 60.0f * inside : -1.0f;
-      for (int c = 0; c < 3; ++c)
-        truth.appearance.sh[3 * v + c] =
-            0.8f * std::sin(3.0f * p[c] + 2.0f * p[(c + 1) % 3] + static_cast<float>(c));
-    }
-    truth.geometry = geometry;
-    truth.background = {0.2f, 0.4f, 0.6f};
-    truth_ = truth;
+    truth_ = VoxelBall(0.6f, 60, [](const Vec3f& p, int c) {
+      return 0.8f * std::sin(3.0f * p[c] + 2.0f * p[(c + 1) % 3] + static_cast<float>(c));
+    });
+    truth_.background = {0.2f, 0.4f, 0.6f};
     for (int i = 0; i < 12; ++i) {
       const double angle = 2 * M_PI * i / 12;
       const Vec3d center{2.6 * std::cos(angle), 2.6 * std::sin(angle),
                          0.7 * std::sin(2 * angle)};
-      Camera camera;
-      camera.width = camera.height = 48;
-      camera.fx = camera.fy = focal_;
-      camera.cx = camera.cy = 24;
+      Camera camera = PinholeOf(48, 48, focal_);
       const Vec3d forward = Normalized(-center);
-      const Vec3d right = Normalized(Cross(forward, Vec3d{0, 0, 1}));
-      const Vec3d down = Cross(forward, right);
-      camera.camera_from_world.rotation.row[0] = right;
-      camera.camera_from_world.rotation.row[1] = down;
-      camera.camera_from_world.rotation.row[2] = forward;
-      camera.camera_from_world.translation = -(camera.camera_from_world.rotation * center);
+      camera.camera_from_world =
+          Facing(center, forward, Normalized(Cross(forward, Vec3d{0, 0, 1})));
       cameras_.push_back(camera);
-      photos_.push_back(RenderViewPlain(truth, camera, {0.5f, 1e-4f}).color);
+      photos_.push_back(RenderViewPlain(truth_, camera, {0.5f, 1e-4f}).color);
     }
     for (size_t i = 1; i < cameras_.size(); ++i) views_.push_back({cameras_[i], &photos_[i]});
     options_.resolutions = {12, 24};
@@ -67,7 +48,7 @@ class FitField : public ::testing::Test {
   }
 
   double HeldOutPsnr(const RadianceField& field) const {
-    return Psnr(RenderView(field, cameras_[0], {0.5f, 1e-4f}).color, photos_[0]);
+    return DecibelsBetween(RenderView(field, cameras_[0], {0.5f, 1e-4f}).color, photos_[0]);
   }
 
   FitResult Fit(const FitHooks& hooks = {}) const {

@@ -1,37 +1,28 @@
 // `regrade evaluate --frames` from tests: the program, and frames of a moving wave.
 #pragma once
 
-#include <gtest/gtest.h>
-
 #include <cmath>
 #include <string>
 #include <vector>
 
-#include "kernels/process/child_process.h"
+#include "pipeline/files/json_file.h"
 #include "pipeline/images/image_file.h"
+#include "tests/support/run_program.h"
 #include "tests/support/temporary_folder.h"
 
 namespace regrade::testing {
 
-struct Outcome {
-  int code = 0;
-  std::string text;
-};
-
-inline Outcome Evaluate(const std::vector<std::string>& arguments) {
-  ChildOptions options;
-  options.argv = {REGRADE_PROGRAM, "evaluate"};
-  options.argv.insert(options.argv.end(), arguments.begin(), arguments.end());
-  options.wall_limit_s = 120;
-  Outcome outcome;
-  const ChildResult result =
-      RunChild(options, [&outcome](const std::string& line) { outcome.text += line + "\n"; });
-  outcome.code = result.end == ChildEnd::kExited ? result.exit_status : 128 + result.signal;
-  return outcome;
+inline ProgramOutcome Evaluate(const std::vector<std::string>& arguments) {
+  return Regrade({"evaluate"}, arguments);
 }
 
-#define EXPECT_OUTPUT(outcome, part) \
-  EXPECT_NE(outcome.text.find(part), std::string::npos) << outcome.text
+// The consistency of a sequence in a report.
+inline JsonValue RowOf(const JsonValue& report, const std::string& sequence, int gap = 1) {
+  for (const JsonValue& row : report.At("consistency").AsArray())
+    if (row.At("sequence").AsString() == sequence && row.At("gap").AsInt() == gap) return row;
+  ADD_FAILURE() << "no row of " << sequence << " at gap " << gap;
+  return {};
+}
 
 // A wave that moves by a pixel per frame.
 inline Image Frame(int i, float flicker = 0) {

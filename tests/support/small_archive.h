@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <map>
 #include <string>
 #include <vector>
 
@@ -26,6 +27,29 @@ inline std::string SmallArchive() {
   writer.AddScalar<double>("pi", 3.25);
   writer.AddText("note", "h\xc3\xa9llo");
   return BytesOf(writer);
+}
+
+// Writes `to` as `from` is, but for one array.
+template <typename T>
+void ReplaceArray(const std::string& from, const std::string& to, const std::string& name,
+                  const std::vector<int64_t>& shape, const T* data) {
+  NpzReader reader(from, 1 << 20);
+  std::map<std::string, NpzArray> kept;
+  for (const std::string& other : reader.names())
+    if (other != name) kept.emplace(other, reader.Read(other));
+  NpzWriter writer;
+  for (const auto& member : kept) {
+    const std::string& other = member.first;
+    const NpzArray& array = member.second;
+    if (array.type == ArrayType::kU8) writer.Add(other, array.shape, array.As<uint8_t>());
+    if (array.type == ArrayType::kF16) writer.Add(other, array.shape, array.As<uint16_t>());
+    if (array.type == ArrayType::kI32) writer.Add(other, array.shape, array.As<int32_t>());
+    if (array.type == ArrayType::kI64) writer.Add(other, array.shape, array.As<int64_t>());
+    if (array.type == ArrayType::kF32) writer.Add(other, array.shape, array.As<float>());
+    if (array.type == ArrayType::kF64) writer.Add(other, array.shape, array.As<double>());
+  }
+  writer.Add(name, shape, data);
+  writer.WriteTo(to);
 }
 
 }  // namespace regrade::testing

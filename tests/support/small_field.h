@@ -52,6 +52,26 @@ inline RadianceField RandomField(const Vec3i& resolution, int basis, double fill
   return RandomValues(std::move(geometry), count, basis, seed);
 }
 
+// A ball around the origin whose density grows by `slope` a unit of depth, of color(position,
+// channel).
+template <typename Color>
+RadianceField VoxelBall(float radius, float slope, const Color& color) {
+  RadianceField field = RandomField({24, 24, 24}, 1, 1.0, 5);
+  auto geometry = std::make_shared<Geometry>(*field.geometry);
+  geometry->frame.center = {0, 0, 0};
+  geometry->frame.radius = {1, 1, 1};
+  for (int64_t v = 0; v < geometry->links.size(); ++v) {
+    const Vec3f p =
+        geometry->frame.WorldOf({static_cast<float>(v / 576), static_cast<float>(v / 24 % 24),
+                                 static_cast<float>(v % 24)});
+    const float inside = radius - Norm(p);
+    geometry->density[v] = inside > 0 ? slope * inside : -1.0f;
+    for (int c = 0; c < 3; ++c) field.appearance.sh[3 * v + c] = color(p, c);
+  }
+  field.geometry = std::move(geometry);
+  return field;
+}
+
 // Adds background layers; about a fraction `fill` of their columns is stored.
 inline void AddSpheres(int layers, int resolution, double fill, uint64_t seed,
                        RadianceField* field) {

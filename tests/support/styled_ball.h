@@ -13,6 +13,7 @@
 #include "kernels/field/spherical_harmonics.h"
 #include "kernels/field/trilinear.h"
 #include "kernels/network/lipschitz_layer.h"
+#include "kernels/scene/facing.h"
 #include "stylize/field/apply_network.h"
 #include "stylize/field/base_map.h"
 #include "stylize/field/gradient_aggregation.h"
@@ -22,6 +23,7 @@
 #include "stylize/training/initial_network.h"
 #include "stylize/training/style_rays.h"
 #include "stylize/training/train_network.h"
+#include "tests/support/pinhole.h"
 #include "tests/support/threads.h"
 
 namespace regrade::testing {
@@ -73,14 +75,8 @@ inline std::vector<Camera> Ring(int views, int size) {
     const Vec3d center{2.2 * std::cos(a), 2.2 * std::sin(a), 0.4 * std::sin(2 * a)};
     const Vec3d forward = Normalized(-center);
     const Vec3d right = Normalized(Cross(forward, Vec3d{0, 0, 1}));
-    Camera camera;
-    camera.width = camera.height = size;
-    camera.fx = camera.fy = 1.3 * size;
-    camera.cx = camera.cy = 0.5 * size;
-    camera.camera_from_world.rotation.row[0] = right;
-    camera.camera_from_world.rotation.row[1] = Cross(forward, right);
-    camera.camera_from_world.rotation.row[2] = forward;
-    camera.camera_from_world.translation = -(camera.camera_from_world.rotation * center);
+    Camera camera = PinholeOf(size, size, 1.3 * size);
+    camera.camera_from_world = Facing(center, forward, right);
     cameras.push_back(camera);
   }
   return cameras;

@@ -1,4 +1,4 @@
-// A new folder for a test, removed at its end.
+// A new folder for a test, removed at its end; texts of its files, and in them.
 #pragma once
 
 #include <stdlib.h>
@@ -40,6 +40,17 @@ inline std::string ReadText(const std::string& path) {
 inline void WriteText(const std::string& path, const std::string& text) {
   std::filesystem::create_directories(std::filesystem::path(path).parent_path());
   std::ofstream(path, std::ios::binary) << text;
+}
+
+inline bool Contains(const std::string& text, const std::string& part) {
+  return text.find(part) != std::string::npos;
+}
+
+inline size_t CountOf(const std::string& text, const std::string& part) {
+  size_t count = 0;
+  for (size_t at = text.find(part); at != std::string::npos; at = text.find(part, at + 1))
+    ++count;
+  return count;
 }
 
 }  // namespace regrade::testing

@@ -11,15 +11,9 @@
 #include "kernels/scene/image.h"
 #include "kernels/synthetic/ray_trace.h"
 #include "kernels/synthetic/synthetic_scene.h"
+#include "tests/support/pictures.h"
 
 namespace regrade::testing {
-
-inline Image Plain(int width, int height, const Vec3d& color) {
-  Image image(width, height);
-  for (size_t i = 0; i < image.pixels.size(); ++i)
-    image.pixels[i] = static_cast<float>(color[static_cast<int>(i % 3)]);
-  return image;
-}
 
 struct TwoRegions {
   std::vector<Image> photos;

@@ -1,15 +1,24 @@
-// Small pictures with smooth waves, an edge and some grain, like small photos.
+// Small pictures like photos.
 #pragma once
+
+#include <gtest/gtest.h>
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "kernels/base/random.h"
 #include "kernels/base/vec.h"
 #include "kernels/scene/image.h"
+#include "stylize/image/view_stylizer.h"
+#include "tests/support/pictures.h"
 
 namespace regrade::testing {
 
+// Tints of two pictures.
+inline const Vec3d kDay{0.8, 0.9, 1.0}, kEvening{1.0, 0.6, 0.35};
+
+// Smooth waves, an edge and some grain.
 inline Image WavyPicture(int width, int height, const Vec3d& tint) {
   Image image(width, height);
   for (int y = 0; y < height; ++y)
@@ -25,11 +34,14 @@ inline Image WavyPicture(int width, int height, const Vec3d& tint) {
   return image;
 }
 
-inline double LargestDifference(const Image& a, const Image& b) {
-  double largest = a.pixels.size() == b.pixels.size() ? 0 : INFINITY;
-  for (size_t i = 0; i < a.pixels.size() && i < b.pixels.size(); ++i)
-    largest = std::max<double>(largest, std::abs(a.pixels[i] - b.pixels[i]));
-  return largest;
+// Views of any size come back as they went.
+template <typename Stylizer>
+void ExpectAnySizeComesBack(const Stylizer& stylizer) {
+  for (const auto& [width, height] :
+       {std::pair{1, 1}, std::pair{8, 8}, std::pair{17, 90}, std::pair{131, 33}}) {
+    const Image photo = WavyPicture(width, height, kDay);
+    EXPECT_EQ(CheckStyledView(photo, stylizer.Stylize(photo, 0), "view 0"), 0);
+  }
 }
 
 }  // namespace regrade::testing

@@ -13,6 +13,7 @@
 #include "kernels/base/random.h"
 #include "kernels/field/pad_sh_basis.h"
 #include "kernels/render/field_renderer.h"
+#include "kernels/scene/facing.h"
 #include "kernels/splats/splat_field.h"
 #include "pipeline/capture/working_views.h"
 #include "pipeline/fields/field_file.h"
@@ -30,6 +31,7 @@
 #include "stylize/image/monge_kantorovich.h"
 #include "stylize/training/initial_network.h"
 #include "tests/support/keyframes.h"
+#include "tests/support/pinhole.h"
 #include "tests/support/small_field.h"
 #include "tests/support/small_splats.h"
 
@@ -39,15 +41,9 @@ namespace {
 constexpr int kWidth = 48, kHeight = 36;
 
 Camera LookingAt(const Vec3d& eye, const Vec3d& at, double focal) {
-  Camera camera;
-  camera.width = kWidth, camera.height = kHeight;
-  camera.fx = camera.fy = focal;
-  camera.cx = kWidth / 2.0, camera.cy = kHeight / 2.0;
+  Camera camera = testing::PinholeOf(kWidth, kHeight, focal);
   const Vec3d ahead = Normalized(at - eye), right = Normalized(Cross(ahead, {0, 0, 1}));
-  camera.camera_from_world.rotation.row[0] = right;
-  camera.camera_from_world.rotation.row[1] = Cross(ahead, right);
-  camera.camera_from_world.rotation.row[2] = ahead;
-  camera.camera_from_world.translation = -(camera.camera_from_world.rotation * eye);
+  camera.camera_from_world = Facing(eye, ahead, right);
   return camera;
 }
 
