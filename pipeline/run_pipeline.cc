@@ -122,7 +122,8 @@ bool RunPipeline(const std::string& first, const std::string& last, RunContext* 
     if (!done) return false;
     if (last == entry->name) break;
   }
-  if (const KeptPhotos* const photos = context->photos.get())
+  if (const KeptPhotos* const photos = context->photos.get();
+      photos != nullptr && photos->decoded() > 0)
     context->console->Detail(Concat("photos: ", photos->decoded(), " decoded, ",
                                     photos->taken(), " taken from memory"));
   return true;

@@ -118,14 +118,14 @@ double SplatSeconds(const SplatFitOptions& options, int64_t photo_pixels, int64_
 
 StagePlan PlanSplatFit(const SplatFitOptions& options, int64_t photo_pixels, int64_t photos,
                        int threads, bool one_by_one) {
-  constexpr double kEntries = 6, kEntryBytes = 12 + 48, kSeenBytes = 100, kOfPixel = 500e-9,
-                   kOfSplat = 400e-9;
+  constexpr double kEntries = 6, kEntryBytes = 12 + 48, kSeenBytes = 100, kThreadBytes = 8e6,
+                   kOfPixel = 500e-9, kOfSplat = 400e-9;
   const double of_photo = one_by_one ? 7 : 12 + 8;  // bytes of a pixel
   const double splats = 1000.0 * double{options.thousands};
   const double bytes =
       splats * (SplatStateBytes(options) + kSeenBytes + kEntries * kEntryBytes);
   return {
-      static_cast<uint64_t>(kProgramBytes + bytes +
+      static_cast<uint64_t>(kProgramBytes + kThreadBytes * threads + bytes +
                             of_photo * static_cast<double>(photo_pixels)),
       SecondsWith(SplatSeconds(options, photo_pixels, photos, kOfPixel, kOfSplat), threads)};
 }

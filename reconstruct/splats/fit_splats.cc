@@ -151,7 +151,8 @@ class SplatFitter {
     step.ssim_weight = options_.ssim_weight;
     SplatUpdate& update = step.update;
     const float part = static_cast<float>(step_) / Steps();
-    step.depth_weight = options_.depth_weight * std::pow(kDepthFall, part);
+    step.depth_weight =
+        options_.depth_weight * std::pow(is_long() ? kLongDepthFall : kDepthFall, part);
     const float warm = WarmUp();
     const float rate = warm * options_.rate_mean *
                        std::pow(options_.rate_mean_end / options_.rate_mean, part) * extent_;
@@ -278,7 +279,8 @@ class SplatFitter {
   // Where a photo sees less of the splats, those that none has changed are spared the
   // regularizers: streets and tours, 0.07 to 0.14; a room has 0.23, and would lose 0.3 dB.
   static constexpr double kFewSeen = 1.0 / 6;
-  static constexpr float kDepthFall = 0.01f;  // of the weight of depths, over a fit
+  // Of the weight of depths, over a fit.
+  static constexpr float kDepthFall = 0.01f, kLongDepthFall = 1e-6f;
   static constexpr double kCheckpointSeconds = 60;
 
   const SplatPhotos& photos_;

@@ -17,8 +17,9 @@ struct SplatFitOptions {
   int sh_degree = 2;
   float ssim_weight = 0.2f;
   float opacity_weight = 0.03f, scale_weight = 0.03f;
-  // See EQ(splat-depth): at the points that COLMAP found. It falls to a hundredth: depths say
-  // early which surfaces there are, and photos late where exactly they lie.
+  // See EQ(splat-depth): at the points that COLMAP found. It falls to a hundredth, in long
+  // fits to a millionth: depths say early which surfaces there are, and photos late where
+  // exactly they lie.
   float depth_weight = 0.1f;
   // Of Adam. That of means is over the cameras' extent, and falls exponentially.
   float rate_mean = 1.6e-4f, rate_mean_end = 1.6e-6f;

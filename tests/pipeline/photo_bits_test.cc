@@ -90,6 +90,32 @@ TEST_F(PhotoBits, SixteenReachTheFit) {
   EXPECT_EQ(DecodePhoto(Ingest().photos[2].path).bits, 8);
 }
 
+TEST_F(PhotoBits, APhotoIsDecodedOnceForAllStages) {
+  for (int i = 0; i < 3; ++i)
+    WriteText(folder_ + "/p" + std::to_string(i) + ".png", EncodePng16(WidePhoto(i)));
+  Capture capture;
+  for (const StagedPhoto& photo : Ingest().photos) capture.views.push_back(ViewOf(photo));
+  Camera& lens = capture.views[1].camera;  // undistorted behind what is kept
+  lens.fx = lens.fy = 96, lens.cx = 48, lens.cy = 32;
+  lens.lens = LensModel::kOpenCv, lens.distortion = {0.2};
+  constexpr int kSize = 40, kBytes = 40 * 27 * 3 * 4;
+  const WorkingViews plain(capture, kSize, 0);
+  const auto kept = std::make_shared<KeptPhotos>(2 * kBytes);  // the third has no room
+  for (int stage = 0; stage < 3; ++stage) {
+    const WorkingViews views = WorkingViews(capture, kSize, 0).KeepingPhotos(kept);
+    for (int i = 0; i < 3; ++i) {
+      EXPECT_EQ(views.Photo(i).pixels, plain.Photo(i).pixels);
+      EXPECT_EQ(views.Pinholes().Photo(i).pixels, plain.Pinholes().Photo(i).pixels);
+    }
+  }
+  EXPECT_EQ(kept->decoded(), 1 + 1 + 6);
+  EXPECT_EQ(kept->taken(), 5 + 5);
+  EXPECT_NE(plain.AtSize(20).KeepingPhotos(kept).Photo(0).width, kSize);
+  fs::remove(capture.views[2].path);
+  EXPECT_NO_THROW(plain.KeepingPhotos(kept).Photo(0));
+  EXPECT_THROW(plain.KeepingPhotos(kept).Photo(2), Error);
+}
+
 TEST_F(PhotoBits, ColmapGetsEight) {
   for (int i = 0; i < 3; ++i)
     WriteText(folder_ + "/p" + std::to_string(i) + ".jpg",
