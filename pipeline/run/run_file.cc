@@ -61,7 +61,10 @@ RunFile RunFileOf(const JsonValue& value) {
   for (const JsonValue& word : value.At("arguments").AsArray())
     file.words.push_back(word.AsString());
   file.options = OptionsOf(value.At("options"));
-  if (const JsonValue* const set_by = value.Find("set_by")) file.set_by = *set_by;
+  if (const JsonValue* const set_by = value.Find("set_by")) {
+    for (const auto& [name, by] : set_by->AsObject()) by.AsString();  // throws
+    file.set_by = *set_by;
+  }
   return file;
 }
 

@@ -77,6 +77,11 @@ TEST(ResolveSettings, EachOptionSaysWhoSetIt) {
   setters["gaps"] = "flag";
   for (const auto& [name, by] : setters.AsObject())
     EXPECT_EQ(again.SetBy(name), again.IsOnce(name) ? "" : by.AsString()) << name;
+  for (const char* wrong : {"3", R"({"seed": 3})"}) {
+    WriteText(run, std::string(R"({"schema": 2, "arguments": [], "options": {}, "set_by": )") +
+                       wrong + "}");
+    EXPECT_REGRADE_ERROR(Resolve({}, {.run_json = run}), ExitCode::kUsage, "run.json");
+  }
 }
 
 TEST(ResolveSettings, PresetsGiveTheirValues) {
