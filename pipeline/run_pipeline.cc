@@ -86,10 +86,6 @@ PlannedStage Planned(const Stage& stage, bool done, RunContext* context) {
   return planned;
 }
 
-}  // namespace
-
-namespace {
-
 // Stages of one command keep the photos that they read, unless its memory is limited.
 void KeepPhotos(RunContext* context) {
   constexpr int64_t kMost = int64_t{1} << 30, kOfFree = 8;
