@@ -178,7 +178,7 @@ void RunMix(const Command& command, const Arguments& arguments, Console* console
     if (file.empty())
       throw InputError("none of the styles has an object", folder,
                        "make it with `regrade stylize " + folder + " --masks FOLDER`");
-    object = ReadObjectFile(file, stored.field.geometry->num_voxels());
+    object = ReadObjectFile(file, stored.records);
   }
   const std::vector<float>* object_weights = object ? &object->all : nullptr;
 

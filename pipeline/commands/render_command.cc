@@ -6,6 +6,7 @@
 #include "kernels/render/field_renderer.h"
 #include "pipeline/capture/working_views.h"
 #include "pipeline/commands/continue_command.h"
+#include "pipeline/fields/seen_field.h"
 #include "pipeline/files/text.h"
 #include "pipeline/images/still_file.h"
 #include "pipeline/program/device_choice.h"
@@ -88,14 +89,19 @@ void RenderStills(const std::string& folder, const std::string& name,
   Workspace scene(folder), style(StyleFolder(folder, name));
   CheckResults(folder, {name});
   constexpr int kLongest = 1 << 16;
-  const StoredField stored = ReadStyledField(folder, style.folder(), settings.style.strength);
+  const std::string field = scene.Path("field.npz");
   const WorkingViews views =
       ReadWorkingViews(scene.Path("poses"), options.size > 0 ? options.size : kLongest, 0)
-          .InField(stored);
+          .InField(ReadFieldGeometry(field));
   const Vignette vignette = ParseVignette(settings.render.vignette);
   std::vector<int> wanted;
-  for (const std::string& still : options.still)
+  std::vector<Camera> cameras;
+  for (const std::string& still : options.still) {
     wanted.push_back(PhotoNamed(views.capture(), still));
+    cameras.push_back(views.CameraOf(wanted.back()));
+  }
+  const StoredField stored =
+      StyledFieldOf(ReadSeenField(field, cameras), style.folder(), settings.style.strength);
   const FieldRenderer renderer(stored.field,
                                ChooseBackend(settings.run.device, settings.run.reproducible));
   for (const int i : wanted) {

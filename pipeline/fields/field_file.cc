@@ -15,50 +15,28 @@
 namespace regrade {
 namespace {
 
-// A grid of voxels has version 1; version 2 was of cells.
-constexpr int32_t kCellsVersion = 2, kSplatsVersion = 3;
-// Colours have 9 columns a channel, as svox2 has them, or the 16 of splats of degree 3.
-constexpr int kLeastStored = 9;
+constexpr int32_t kCellsVersion = 2, kNewestVersion = 3;
 constexpr int64_t kSphericalHarmonics = 1;  // svox2's basis_type
-
-uint16_t StoredColour(float value) {
-  return HalfFromFloat(std::clamp(value, -kMaxHalf, kMaxHalf));
-}
-
-int StoredBasis(const Appearance& appearance) {
-  return std::max(appearance.basis, kLeastStored);
-}
-
-// Colours of records [first, first + count) in half precision, 3 x StoredBasis values each.
-void PackColours(const Appearance& appearance, int64_t first, int64_t count, uint16_t* to) {
-  const int stored = StoredBasis(appearance);
-  std::fill_n(to, count * 3 * stored, uint16_t{0});
-#pragma omp parallel for schedule(static)
-  for (int64_t i = 0; i < count; ++i)
-    for (int channel = 0; channel < 3; ++channel)
-      for (int k = 0; k < appearance.basis; ++k)
-        to[(i * 3 + channel) * stored + k] =
-            StoredColour(appearance.sh[((first + i) * 3 + channel) * appearance.basis + k]);
-}
 
 float ValueAt(const NpzArray& array, int64_t i) {
   return array.type == ArrayType::kF16 ? FloatFromHalf(array.As<uint16_t>()[i])
                                        : array.As<float>()[i];
 }
 
-// Colour columns [first, first + 3 * stored) of `array`, of which the first `basis` harmonics
-// of each channel are kept.
-Buffer<float> UnpackedColours(const NpzArray& array, int64_t first, int stored, int basis) {
-  const int64_t voxels = array.shape[0], columns = array.shape[1];
-  Buffer<float> sh(voxels * 3 * basis);
-#pragma omp parallel for schedule(static)
-  for (int64_t i = 0; i < voxels; ++i)
+// Where the colours of a row of the file go, and which of its columns they are: from `first` on
+// `stored` of each channel, of which the first `basis` are kept.
+struct ColourColumns {
+  int64_t first = 0;
+  int stored = 0, basis = 0;
+
+  bool HasDensity() const { return first > 0; }  // in the column before
+  void Unpack(const NpzArray& rows, int64_t row, float* sh) const {
     for (int channel = 0; channel < 3; ++channel)
       for (int k = 0; k < basis; ++k)
-        sh[(i * 3 + channel) * basis + k] =
-            ValueAt(array, i * columns + first + channel * stored + k);
-  return sh;
-}
+        sh[channel * basis + k] =
+            ValueAt(rows, row * rows.shape[1] + first + channel * stored + k);
+  }
+};
 
 [[noreturn]] void Refuse(const std::string& path, const std::string& why,
                          const std::string& hint = "") {
@@ -72,7 +50,7 @@ Vec3f ReadVec3(NpzReader* file, const std::string& name) {
 }
 
 void CheckReadable(NpzReader* file) {
-  RefuseNewerFormat(file, kSplatsVersion);
+  RefuseNewerFormat(file, kNewestVersion);
   if (file->Has("regrade_version") &&
       file->ReadScalar<int32_t>("regrade_version") == kCellsVersion)
     Refuse(file->path(), "its field has cells, which this version does not read",
@@ -85,27 +63,6 @@ void CheckReadable(NpzReader* file) {
       Refuse(file->path(), "its colours are not spherical harmonics",
              "train the checkpoint with svox2's default basis");
   }
-}
-
-// Arrays that are made for the file, which WriteTo reads.
-struct MadeArrays {
-  std::vector<uint16_t> log_scale, quaternion, opacity_logit;
-  std::vector<float> texels;
-};
-
-// svox2's arrays: links [2R, R], and by column and layer red, green, blue, density.
-void AddSpheres(const RadianceField& field, MadeArrays* made, NpzWriter* file) {
-  const SphereGeometry& spheres = field.geometry->spheres;
-  if (!spheres.on()) return;
-  made->texels.resize(4 * spheres.num_texels());
-  for (int64_t i = 0; i < spheres.num_texels(); ++i) {
-    float* const texel = made->texels.data() + 4 * i;
-    std::copy_n(field.appearance.sphere_color.data() + 3 * i, 3, texel);
-    texel[3] = spheres.density[i];
-  }
-  file->Add("background_links", {2 * spheres.resolution, spheres.resolution},
-            spheres.links.data(), NpzPacking::kDeflate);
-  file->Add("background_data", {spheres.num_columns(), spheres.layers, 4}, made->texels.data());
 }
 
 void ReadSpheres(NpzReader* file, SphereGeometry* spheres, Buffer<float>* color) {
@@ -139,25 +96,6 @@ struct Rows {
   std::optional<int64_t> count = {};
   std::string reason = {};
 };
-
-std::vector<uint16_t> Halves(const Buffer<float>& values) {
-  std::vector<uint16_t> halves(static_cast<size_t>(values.size()));
-  std::ranges::transform(values, halves.begin(), StoredColour);
-  return halves;
-}
-
-void AddSplats(const Geometry& geometry, MadeArrays* made, NpzWriter* file) {
-  const SplatGeometry& splats = geometry.splats;
-  const int64_t n = splats.opacity_logit.size();
-  made->log_scale = Halves(splats.log_scale);
-  made->quaternion = Halves(splats.quaternion);
-  made->opacity_logit = Halves(splats.opacity_logit);
-  file->Add("regrade_splats_mean", {n, 3}, splats.mean.data());
-  file->Add("regrade_splats_log_scale", {n, 3}, made->log_scale.data());
-  file->Add("regrade_splats_quaternion", {n, 4}, made->quaternion.data());
-  file->Add("regrade_splats_opacity_logit", {n}, made->opacity_logit.data());
-  file->AddScalar("regrade_splats_fit_pixel", splats.fit_pixel);
-}
 
 Buffer<float> ReadHalves(NpzReader* file, const std::string& name,
                          const std::vector<int64_t>& shape) {
@@ -200,150 +138,167 @@ Rows ReadLinks(NpzReader* file, Geometry* geometry) {
   return {};
 }
 
-void AddLinks(const Geometry& geometry, MadeArrays*, NpzWriter* file) {
-  const Vec3i& n = geometry.frame.resolution;
-  file->Add("links", {n.x, n.y, n.z}, geometry.links.data(), NpzPacking::kDeflate);
-}
-
-// How a file holds a geometry.
-struct Layout {
-  int32_t version;
-  bool densities;
-  Rows (*read)(NpzReader* file, Geometry* geometry);
-  void (*add)(const Geometry& geometry, MadeArrays* made, NpzWriter* file);
-};
-constexpr Layout kVoxels{1, true, ReadLinks, AddLinks},
-    kSplats{kSplatsVersion, false, ReadSplats, AddSplats};
-
-const Layout& LayoutOf(const Geometry& geometry) {
-  return geometry.splats.on() ? kSplats : kVoxels;
-}
-
-const Layout& LayoutOf(NpzReader* file) {
-  if (!file->Has("regrade_splats_mean")) return kVoxels;
+Rows ReadGeometry(NpzReader* file, Geometry* geometry) {
+  if (!file->Has("regrade_splats_mean")) return ReadLinks(file, geometry);
   if (file->Has("links")) Refuse(file->path(), "a field has voxels or splats, not both");
-  return kSplats;
+  return ReadSplats(file, geometry);
 }
 
-void ReadValues(NpzReader* file, const Layout& layout, const Rows& rows, Geometry* geometry,
-                Appearance* appearance) {
-  const bool joined = file->Has("data");  // old checkpoints: [density, colours] by row
-  const NpzArray colours = file->Read(joined ? "data" : "sh_data");
-  const int64_t first = joined ? 1 : 0;
+std::string NameOfColours(const NpzReader& file) {
+  return file.Has("data") ? "data" : "sh_data";  // old checkpoints: [density, colours] by row
+}
+
+ColourColumns ColumnsOf(NpzReader* file, const Rows& rows, int64_t* count) {
+  const std::string name = NameOfColours(*file);
+  const NpzArray colours = file->Describe(name);
+  ColourColumns columns;
+  columns.first = name == "data" ? 1 : 0;
   if (colours.shape.size() != 2 ||
       (colours.type != ArrayType::kF16 && colours.type != ArrayType::kF32) ||
-      (colours.shape[1] - first) % 3 != 0 || colours.shape[1] > first + 3 * kMaxBasis ||
-      !IsBasis(static_cast<int>(colours.shape[1] - first) / 3))
+      (colours.shape[1] - columns.first) % 3 != 0 ||
+      colours.shape[1] > columns.first + 3 * kMaxBasis ||
+      !IsBasis(static_cast<int>(colours.shape[1] - columns.first) / 3))
     Refuse(file->path(), std::string("colours are ") + NameOf(colours.type) +
                              colours.ShapeText() + "; 3, 12, 27 or 48 columns are read");
-  if (rows.count && colours.shape[0] != *rows.count)
-    Refuse(file->path() + ": array '" + (joined ? "data" : "sh_data") + "'",
-           Concat(colours.shape[0], " rows, but ", rows.reason));
-  const int stored = static_cast<int>((colours.shape[1] - first) / 3);
-  appearance->basis =
-      file->Has("regrade_basis") ? file->ReadScalar<int32_t>("regrade_basis") : stored;
-  const int basis = appearance->basis;
-  if (!IsBasis(basis) || basis > stored)
-    Refuse(file->path(),
-           Concat("regrade_basis is ", basis, " of ", stored, " stored harmonics"));
-  appearance->sh = UnpackedColours(colours, first, stored, basis);
-  if (!layout.densities) return;
-  geometry->density.Resize(colours.shape[0]);
-  if (joined) {
-    for (int64_t i = 0; i < colours.shape[0]; ++i)
-      geometry->density[i] = ValueAt(colours, i * colours.shape[1]);
-  } else {
-    const NpzArray density = file->Read("density_data", ArrayType::kF32, {colours.shape[0], 1});
-    std::copy_n(density.As<float>(), density.num_elements(), geometry->density.data());
+  *count = colours.shape[0];
+  if (rows.count && *count != *rows.count)
+    Refuse(file->path() + ": array '" + name + "'", Concat(*count, " rows, but ", rows.reason));
+  columns.stored = static_cast<int>((colours.shape[1] - columns.first) / 3);
+  columns.basis =
+      file->Has("regrade_basis") ? file->ReadScalar<int32_t>("regrade_basis") : columns.stored;
+  if (!IsBasis(columns.basis) || columns.basis > columns.stored)
+    Refuse(file->path(), Concat("regrade_basis is ", columns.basis, " of ", columns.stored,
+                                " stored harmonics"));
+  return columns;
+}
+
+// `density`: of the same rows; null where they are apart.
+void ReadColours(NpzReader* file, const ColourColumns& columns, const KeptRecords& records,
+                 Appearance* appearance, Buffer<float>* density) {
+  appearance->basis = columns.basis;
+  const int64_t each = appearance->stride();
+  const int64_t most = records.all ? records.of : std::ssize(records.kept);
+  appearance->sh.Resize(each * most);
+  if (density != nullptr) density->Resize(most);
+  int64_t begin = 0;  // what is read of `most`
+  file->ReadRows(NameOfColours(*file), [&](int64_t first, const NpzArray& rows) {
+    const int64_t next = first + rows.shape[0];
+    const int64_t end =
+        records.all ? next
+                    : std::ranges::lower_bound(records.kept, next) - records.kept.begin();
+#pragma omp parallel for schedule(static)
+    for (int64_t i = begin; i < end; ++i) {
+      const int64_t row = (records.all ? i : records.kept[static_cast<size_t>(i)]) - first;
+      columns.Unpack(rows, row, appearance->sh.data() + each * i);
+      if (density != nullptr) (*density)[i] = ValueAt(rows, row * rows.shape[1]);
+    }
+    begin = end;
+  });
+}
+
+void ReadDensities(NpzReader* file, int64_t count, Buffer<float>* densities) {
+  const NpzArray density = file->Read("density_data", ArrayType::kF32, {count, 1});
+  densities->Resize(count);
+  std::copy_n(density.As<float>(), count, densities->data());
+}
+
+// What a filter keeps of a geometry of splats.
+void Keep(const std::vector<uint8_t>& which, SplatGeometry* splats, KeptRecords* records) {
+  REGRADE_CHECK(std::ssize(which) == records->of);
+  records->all = false;
+  for (int64_t i = 0; i < records->of; ++i)
+    if (which[static_cast<size_t>(i)] != 0) records->kept.push_back(i);
+  if (records->kept.empty()) records->kept.push_back(0);  // a field has splats
+  const auto pick = [&](int each, Buffer<float>* values) {
+    Buffer<float> picked(each * std::ssize(records->kept));
+    float* to = picked.data();
+    for (const int64_t i : records->kept) {
+      std::copy_n(values->data() + each * i, each, to);
+      to += each;
+    }
+    *values = std::move(picked);
+  };
+  pick(3, &splats->mean);
+  pick(3, &splats->log_scale);
+  pick(4, &splats->quaternion);
+  pick(1, &splats->opacity_logit);
+}
+
+void ReadPlacement(NpzReader* file, StoredField* stored) {
+  const std::string& path = file->path();
+  if (file->Has("regrade_background"))
+    stored->field.background = ReadVec3(file, "regrade_background");
+  if (file->Has("regrade_near_clip"))
+    stored->field.near_clip = file->ReadScalar<float>("regrade_near_clip");
+  if (file->Has("regrade_step"))
+    stored->field.march.step = file->ReadScalar<float>("regrade_step");
+  if (file->Has("regrade_stop"))
+    stored->field.march.stop_transmittance = file->ReadScalar<float>("regrade_stop");
+  if (file->Has("regrade_field_from_world")) {
+    const NpzArray array = file->Read("regrade_field_from_world", ArrayType::kF64, {13});
+    const double* placement = array.As<double>();
+    stored->field_from_world.scale = placement[0];
+    for (int i = 0; i < 3; ++i) {
+      for (int j = 0; j < 3; ++j)
+        stored->field_from_world.rotation(i, j) = placement[1 + 3 * i + j];
+      stored->field_from_world.translation[i] = placement[10 + i];
+    }
+    if (!IsSound(stored->field_from_world))
+      Refuse(path, "regrade_field_from_world is not a similarity");
   }
+  if (file->Has("regrade_ndc")) {
+    const NpzArray array = file->Read("regrade_ndc", ArrayType::kF64, {2});
+    stored->ndc = {array.As<double>()[0], array.As<double>()[1]};
+    if (!(stored->ndc.a > 0 && stored->ndc.a < 1e3 && stored->ndc.b > 0 && stored->ndc.b < 1e3))
+      Refuse(path, "regrade_ndc is not the field of view of a picture");
+  }
+}
+
+// `keep` may be empty; `colors` is false where splats are to have none.
+StoredField ReadField(const std::string& path, uint64_t budget, const SplatFilter& keep,
+                      bool colors) {
+  NpzReader file(path, budget);
+  CheckReadable(&file);
+  StoredField stored;
+  RadianceField& field = stored.field;
+  field.background = {1, 1, 1};  // svox2's
+  const auto geometry = std::make_shared<Geometry>();
+  field.geometry = geometry;
+  geometry->frame.radius = ReadVec3(&file, "radius");
+  geometry->frame.center = ReadVec3(&file, "center");
+  const Rows rows = ReadGeometry(&file, geometry.get());
+  const bool splats = geometry->splats.on();
+  ReadPlacement(&file, &stored);
+  const ColourColumns columns = ColumnsOf(&file, rows, &stored.records.of);
+  if (splats && keep) {
+    Keep(keep(field), &geometry->splats, &stored.records);
+  }
+  const bool apart = !splats && !columns.HasDensity();
+  if (apart) ReadDensities(&file, stored.records.of, &geometry->density);
+  if (splats && !colors) {
+    field.appearance.basis = 1;
+    field.appearance.sh.Resize(3 * stored.records.of);
+  } else {
+    ReadColours(&file, columns, stored.records, &field.appearance,
+                splats || apart ? nullptr : &geometry->density);
+  }
+  ReadSpheres(&file, &geometry->spheres, &field.appearance.sphere_color);
+  Validate(field, path.c_str());
+  return stored;
 }
 
 }  // namespace
 
-void WriteFieldFile(const std::string& path, const StoredField& stored) {
-  const RadianceField& field = stored.field;
-  const Geometry& geometry = *field.geometry;
-  const int64_t voxels = geometry.num_voxels();
-  const Similarity& similarity = stored.field_from_world;
-  double placement[13] = {similarity.scale};
-  for (int i = 0; i < 3; ++i) {
-    for (int j = 0; j < 3; ++j) placement[1 + 3 * i + j] = similarity.rotation(i, j);
-    placement[10 + i] = similarity.translation[i];
-  }
-
-  NpzWriter file;
-  file.Add("radius", {3}, &geometry.frame.radius.x);
-  file.Add("center", {3}, &geometry.frame.center.x);
-  const Layout& layout = LayoutOf(geometry);
-  MadeArrays made;  // read by the writer in WriteTo
-  layout.add(geometry, &made, &file);
-  if (layout.densities) file.Add("density_data", {voxels, 1}, geometry.density.data());
-  file.AddFilled<uint16_t>(
-      "sh_data", {voxels, 3 * StoredBasis(field.appearance)},
-      [&field](int64_t first, int64_t count, uint16_t* to) {
-        PackColours(field.appearance, first, count, to);
-      },
-      field.appearance.basis >= kLeastStored ? NpzPacking::kStore : NpzPacking::kDeflate);
-  file.AddScalar<int64_t>("basis_type", kSphericalHarmonics);
-  file.AddScalar<int32_t>("regrade_version", layout.version);
-  file.AddScalar<int32_t>("regrade_basis", field.appearance.basis);
-  file.Add("regrade_background", {3}, &field.background.x);
-  file.AddScalar<float>("regrade_near_clip", field.near_clip);
-  file.AddScalar<float>("regrade_step", field.march.step);
-  file.AddScalar<float>("regrade_stop", field.march.stop_transmittance);
-  file.Add("regrade_field_from_world", {13}, placement);
-  if (stored.ndc.on()) file.Add("regrade_ndc", {2}, &stored.ndc.a);
-  AddSpheres(field, &made, &file);
-  file.WriteTo(path);
-}
-
-void RoundAsStored(Appearance* appearance) {
-  const int64_t n = appearance->sh.size();
-#pragma omp parallel for schedule(static)
-  for (int64_t i = 0; i < n; ++i)
-    appearance->sh[i] = FloatFromHalf(StoredColour(appearance->sh[i]));
-}
-
 StoredField ReadFieldFile(const std::string& path, uint64_t budget) {
-  NpzReader file(path, budget);
-  CheckReadable(&file);
-  StoredField stored;
-  Geometry geometry;
-  geometry.frame.radius = ReadVec3(&file, "radius");
-  geometry.frame.center = ReadVec3(&file, "center");
-  const Layout& layout = LayoutOf(&file);
-  const Rows rows = layout.read(&file, &geometry);
-  ReadValues(&file, layout, rows, &geometry, &stored.field.appearance);
-  ReadSpheres(&file, &geometry.spheres, &stored.field.appearance.sphere_color);
-  stored.field.geometry = std::make_shared<const Geometry>(std::move(geometry));
-  stored.field.background =
-      file.Has("regrade_background") ? ReadVec3(&file, "regrade_background") : Vec3f{1, 1, 1};
-  if (file.Has("regrade_near_clip"))
-    stored.field.near_clip = file.ReadScalar<float>("regrade_near_clip");
-  if (file.Has("regrade_step"))
-    stored.field.march.step = file.ReadScalar<float>("regrade_step");
-  if (file.Has("regrade_stop"))
-    stored.field.march.stop_transmittance = file.ReadScalar<float>("regrade_stop");
-  if (file.Has("regrade_field_from_world")) {
-    const NpzArray array = file.Read("regrade_field_from_world", ArrayType::kF64, {13});
-    const double* placement = array.As<double>();
-    stored.field_from_world.scale = placement[0];
-    for (int i = 0; i < 3; ++i) {
-      for (int j = 0; j < 3; ++j)
-        stored.field_from_world.rotation(i, j) = placement[1 + 3 * i + j];
-      stored.field_from_world.translation[i] = placement[10 + i];
-    }
-    if (!IsSound(stored.field_from_world))
-      Refuse(path, "regrade_field_from_world is not a similarity");
-  }
-  if (file.Has("regrade_ndc")) {
-    const NpzArray array = file.Read("regrade_ndc", ArrayType::kF64, {2});
-    stored.ndc = {array.As<double>()[0], array.As<double>()[1]};
-    if (!(stored.ndc.a > 0 && stored.ndc.a < 1e3 && stored.ndc.b > 0 && stored.ndc.b < 1e3))
-      Refuse(path, "regrade_ndc is not the field of view of a picture");
-  }
-  Validate(stored.field, path.c_str());
-  return stored;
+  return ReadField(path, budget, {}, true);
+}
+
+StoredField ReadPartOfField(const std::string& path, const SplatFilter& keep) {
+  return ReadField(path, kMostField, keep, true);
+}
+
+StoredField ReadFieldGeometry(const std::string& path) {
+  return ReadField(path, kMostField, {}, false);
 }
 
 }  // namespace regrade

@@ -17,10 +17,13 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <string>
+#include <vector>
 
 #include "kernels/field/radiance_field.h"
 #include "kernels/scene/camera.h"
+#include "pipeline/fields/kept_records.h"
 
 namespace regrade {
 
@@ -28,7 +31,8 @@ struct StoredField {
   RadianceField field;
   // From the frame of the capture's cameras to the field's.
   Similarity field_from_world;
-  NdcSpace ndc;  // on where the field's frame is that of a forward-facing capture's NDC
+  NdcSpace ndc;         // on where the field's frame is that of a forward-facing capture's NDC
+  KeptRecords records;  // of the file that it was read from
 };
 
 // Colours are rounded to half precision (to nearest, ties to even; beyond its range to the
@@ -46,6 +50,18 @@ void RoundAsStored(Appearance* appearance);
 // svox2 gets a white background, svox2's default: its file has no entry for it. Throws
 // Error(kInput) for files that are damaged, larger than `budget` bytes, from a newer version of
 // this program, or not renderable (learned bases). The field has passed Validate.
-StoredField ReadFieldFile(const std::string& path, uint64_t budget = uint64_t{64} << 30);
+inline constexpr uint64_t kMostField = uint64_t{256} << 30;
+StoredField ReadFieldFile(const std::string& path, uint64_t budget = kMostField);
+
+// Which splats [splats] are kept, of a field without colours.
+using SplatFilter = std::function<std::vector<uint8_t>(const RadianceField& field)>;
+
+// The splats that `keep` chooses, with their colours: no others' colours are in memory, and
+// their geometry, 44 B a splat, only while the file is read. Where none is chosen, the first is
+// kept. Voxels are read whole.
+StoredField ReadPartOfField(const std::string& path, const SplatFilter& keep);
+
+// Splats in place of whose colours there is one coefficient, 0. Voxels are read whole.
+StoredField ReadFieldGeometry(const std::string& path);
 
 }  // namespace regrade

@@ -32,7 +32,8 @@ void WriteObjectFile(const std::string& path, const ObjectWeights& weights) {
   file.WriteTo(path);
 }
 
-ObjectWeights ReadObjectFile(const std::string& path, int64_t voxels) {
+ObjectWeights ReadObjectFile(const std::string& path, const KeptRecords& records) {
+  const int64_t voxels = records.of;
   NpzReader file(path, uint64_t{16} << 30);
   RefuseNewerFormat(&file, kObjectVersion);
   const NpzArray array = file.Read("weights", ArrayType::kF32, {-1, voxels});
@@ -42,7 +43,7 @@ ObjectWeights ReadObjectFile(const std::string& path, int64_t voxels) {
   ObjectWeights weights;
   for (int64_t k = 0; k < regions; ++k) {
     const float* first = array.As<float>() + k * voxels;
-    weights.regions.emplace_back(first, first + voxels);
+    weights.regions.push_back(records.Pick(std::vector<float>(first, first + voxels)));
   }
   for (const std::vector<float>& region : weights.regions)
     if (!std::ranges::all_of(region, [](float e) { return e >= 0 && e <= 1; }))

@@ -6,6 +6,8 @@
 #include <string>
 #include <vector>
 
+#include "pipeline/fields/kept_records.h"
+
 namespace regrade {
 
 inline constexpr int kMostObjectRegions = 16;
@@ -21,7 +23,8 @@ std::vector<float> SumOfRegions(const std::vector<std::vector<float>>& regions);
 // Throws Error(kResources).
 void WriteObjectFile(const std::string& path, const ObjectWeights& weights);
 
-// Throws Error(kInput) for a file that is damaged, newer, or does not fit `voxels`.
-ObjectWeights ReadObjectFile(const std::string& path, int64_t voxels);
+// Those of `records`. Throws Error(kInput) for a file that is damaged, newer, or has another
+// number of voxels than the field's file.
+ObjectWeights ReadObjectFile(const std::string& path, const KeptRecords& records);
 
 }  // namespace regrade

@@ -44,13 +44,15 @@ void WriteResidualFile(const std::string& path, const VoxelResidual& residual) {
   file.WriteTo(path);
 }
 
-VoxelResidual ReadResidualFile(const std::string& path, int64_t voxels) {
+VoxelResidual ReadResidualFile(const std::string& path, const KeptRecords& records) {
+  const int64_t voxels = records.of;
   NpzReader file(path, uint64_t{16} << 30);
   RefuseNewerFormat(&file, kResidualVersion);
   VoxelResidual residual;
-  residual.color = ReadColors(&file, "residual", voxels, -kLargest, kLargest, path);
+  residual.color =
+      records.Pick(ReadColors(&file, "residual", voxels, -kLargest, kLargest, path));
   if (file.Has("view_scale"))
-    residual.view_scale = ReadColors(&file, "view_scale", voxels, 0, 1, path);
+    residual.view_scale = records.Pick(ReadColors(&file, "view_scale", voxels, 0, 1, path));
   return residual;
 }
 

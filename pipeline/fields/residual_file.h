@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <string>
 
+#include "pipeline/fields/kept_records.h"
 #include "stylize/field/voxel_residual.h"
 
 namespace regrade {
@@ -13,7 +14,8 @@ namespace regrade {
 // Error(kResources).
 void WriteResidualFile(const std::string& path, const VoxelResidual& residual);
 
-// Throws Error(kInput) for a file that is damaged, newer, or does not fit `voxels`.
-VoxelResidual ReadResidualFile(const std::string& path, int64_t voxels);
+// Those of `records`. Throws Error(kInput) for a file that is damaged, newer, or has another
+// number of voxels than the field's file.
+VoxelResidual ReadResidualFile(const std::string& path, const KeptRecords& records);
 
 }  // namespace regrade

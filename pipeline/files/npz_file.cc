@@ -14,7 +14,8 @@ namespace {
 
 constexpr char kSuffix[] = ".npy";
 constexpr zip_int64_t kMaxMembers = 10000;
-constexpr uint64_t kMaxRatio = 1032;  // of deflate
+constexpr uint64_t kMaxRatio = 1032;    // of deflate
+constexpr int64_t kRowBytes = 4 << 20;  // of rows that are read together
 
 [[noreturn]] void RefuseArchive(const std::string& path, const std::string& why) {
   throw InputError("zip archive: " + why, path,
@@ -120,64 +121,128 @@ std::vector<std::string> NpzReader::names() const {
 
 bool NpzReader::Has(const std::string& name) const { return archive_->Find(name) != nullptr; }
 
-NpzArray NpzReader::Read(const std::string& name) {
+// A member that is read from its beginning to its end.
+class NpzReader::OpenMember {
+ public:
+  OpenMember(zip_t* zip, const ZipMember& member, std::string where)
+      : where_(std::move(where)),
+        file_(zip_fopen_index(zip, member.index, 0), &zip_fclose),
+        left_(member.bytes) {
+    if (file_ == nullptr) throw InputError("cannot be unpacked", where_);
+    ReadHeader();
+  }
+
+  const NpyHeader& header() const { return header_; }
+
+  void Read(void* to, uint64_t size) {
+    const uint64_t ahead = std::min<uint64_t>(size, head_.size());
+    std::memcpy(to, head_.data(), ahead);
+    head_.erase(0, ahead);
+    Unpack(static_cast<char*>(to) + ahead, size - ahead);
+  }
+
+  // libzip compares the checksum at the end of the member.
+  void Finish() {
+    char beyond;
+    if (zip_fread(file_.get(), &beyond, 1) != 0)
+      throw InputError("its checksum or length is wrong", where_,
+                       "the file is damaged: make it again");
+  }
+
+ private:
+  void Unpack(char* to, uint64_t size) {
+    uint64_t done = 0;
+    while (done < size) {
+      const zip_int64_t n = zip_fread(file_.get(), to + done, size - done);
+      if (n <= 0)
+        throw InputError(n < 0 ? "its checksum or packing is wrong" : "it ends too early",
+                         where_, "the file is damaged: make it again");
+      done += static_cast<uint64_t>(n);
+    }
+    left_ -= size;
+  }
+
+  // The fixed part gives the header's length, the header the length of the data.
+  void ReadHeader() {
+    std::string head(std::min<uint64_t>(12, left_), '\0');
+    Unpack(head.data(), head.size());
+    const size_t prefix = head.size() == 12 && head[6] > 1 ? 12 : 10;
+    if (head.size() == 12) {
+      uint64_t length = 0;
+      for (size_t i = prefix; i-- > 8;)
+        length = length << 8 | static_cast<unsigned char>(head[i]);
+      const uint64_t total = prefix + std::min<uint64_t>(length, 64 << 10);
+      if (total > head.size()) {
+        const size_t have = head.size();
+        head.resize(have + std::min(total - have, left_));
+        Unpack(head.data() + have, head.size() - have);
+      }
+    }
+    header_ = ParseNpyHeader(head, where_);
+    head_ = head.substr(header_.data_offset);
+    if (header_.data_bytes != left_ + head_.size())
+      throw InputError(Concat("its shape asks for ", header_.data_bytes, " bytes, it has ",
+                              left_ + head_.size()),
+                       where_);
+  }
+
+  std::string where_;
+  std::unique_ptr<zip_file_t, decltype(&zip_fclose)> file_;
+  uint64_t left_;
+  NpyHeader header_;
+  std::string head_;  // data that came with a header shorter than the fixed part
+};
+
+NpzReader::OpenMember NpzReader::Open(const std::string& name) {
   const std::string where = path_ + ": array '" + name + "'";
   const ZipMember* member = archive_->Find(name);
   if (member == nullptr) throw InputError("is missing", where);
-  if (member->bytes > budget_)
-    throw InputError(
-        Concat(member->bytes, " bytes, more than the ", budget_, " that may still be read"),
-        where, "give more memory with --max-memory");
-  budget_ -= member->bytes;
+  return {archive_->zip, *member, where};
+}
 
-  const std::unique_ptr<zip_file_t, decltype(&zip_fclose)> file(
-      zip_fopen_index(archive_->zip, member->index, 0), &zip_fclose);
-  if (file == nullptr) throw InputError("cannot be unpacked", where);
-  uint64_t left = member->bytes;
-  const auto read = [&](void* to, uint64_t size) {
-    uint64_t done = 0;
-    while (done < size) {
-      const zip_int64_t n = zip_fread(file.get(), static_cast<char*>(to) + done, size - done);
-      if (n <= 0)
-        throw InputError(n < 0 ? "its checksum or packing is wrong" : "it ends too early",
-                         where, "the file is damaged: make it again");
-      done += static_cast<uint64_t>(n);
-    }
-    left -= size;
-  };
-
-  // The fixed part gives the header's length, the header the length of the data.
-  std::string head(std::min<uint64_t>(12, left), '\0');
-  read(head.data(), head.size());
-  const size_t prefix = head.size() == 12 && head[6] > 1 ? 12 : 10;
-  if (head.size() == 12) {
-    uint64_t length = 0;
-    for (size_t i = prefix; i-- > 8;)
-      length = length << 8 | static_cast<unsigned char>(head[i]);
-    const uint64_t total = prefix + std::min<uint64_t>(length, 64 << 10);
-    if (total > head.size()) {
-      const size_t have = head.size();
-      head.resize(have + std::min(total - have, left));
-      read(head.data() + have, head.size() - have);
-    }
-  }
-  const NpyHeader header = ParseNpyHeader(head, where);
-  const uint64_t surplus =
-      head.size() - header.data_offset;  // of headers shorter than the fixed part
-  if (header.data_bytes != left + surplus)
+NpzReader::OpenMember NpzReader::OpenWithinBudget(const std::string& name) {
+  OpenMember member = Open(name);
+  const uint64_t bytes = member.header().data_bytes;
+  if (bytes > budget_)
     throw InputError(
-        Concat("its shape asks for ", header.data_bytes, " bytes, it has ", left + surplus),
-        where);
+        Concat(bytes, " bytes, more than the ", budget_, " that may still be read"),
+        path_ + ": array '" + name + "'", "give more memory with --max-memory");
+  budget_ -= bytes;
+  return member;
+}
+
+NpzArray NpzReader::Describe(const std::string& name) {
+  const NpyHeader header = Open(name).header();
+  return {header.type, header.shape, {}};
+}
+
+NpzArray NpzReader::Read(const std::string& name) {
+  OpenMember member = OpenWithinBudget(name);
+  const NpyHeader& header = member.header();
   NpzArray array{header.type, header.shape, {}};
   array.bytes.Resize(static_cast<int64_t>(header.data_bytes));
-  if (surplus > 0) std::memcpy(array.bytes.data(), &head[header.data_offset], surplus);
-  read(array.bytes.data() + surplus, left);
-  // libzip compares the checksum at the end of the member.
-  char beyond;
-  if (zip_fread(file.get(), &beyond, 1) != 0)
-    throw InputError("its checksum or length is wrong", where,
-                     "the file is damaged: make it again");
+  member.Read(array.bytes.data(), header.data_bytes);
+  member.Finish();
   return array;
+}
+
+void NpzReader::ReadRows(const std::string& name,
+                         const std::function<void(int64_t first, const NpzArray& rows)>& take) {
+  OpenMember member = OpenWithinBudget(name);
+  const NpyHeader& header = member.header();
+  NpzArray rows{header.type, header.shape, {}};
+  const int64_t count = header.shape.empty() ? 1 : header.shape[0];
+  if (count == 0) take(0, rows);
+  const int64_t each = count > 0 ? static_cast<int64_t>(header.data_bytes) / count : 0;
+  const int64_t step = std::max<int64_t>(1, kRowBytes / std::max<int64_t>(each, 1));
+  for (int64_t first = 0; first < count; first += step) {
+    const int64_t here = std::min(step, count - first);
+    if (!rows.shape.empty()) rows.shape[0] = here;
+    rows.bytes.Resize(here * each);
+    member.Read(rows.bytes.data(), static_cast<uint64_t>(here * each));
+    take(first, rows);
+  }
+  member.Finish();
 }
 
 NpzArray NpzReader::Read(const std::string& name, ArrayType type,

@@ -110,6 +110,12 @@ class NpzReader {
   NpzArray Read(const std::string& name);
   // Exactly this type and shape; -1 in `shape` is any length.
   NpzArray Read(const std::string& name, ArrayType type, const std::vector<int64_t>& shape);
+  // Its type and shape, without its values.
+  NpzArray Describe(const std::string& name);
+  // The same array, some rows of its first axis at a time: as many as a few megabytes hold, the
+  // array's shape but for their number. An array without rows is taken once.
+  void ReadRows(const std::string& name,
+                const std::function<void(int64_t first, const NpzArray& rows)>& take);
   template <typename T>
   T ReadScalar(const std::string& name) {
     return *Read(name, ArrayTypeOf<T>::value, {}).template As<T>();
@@ -119,6 +125,9 @@ class NpzReader {
 
  private:
   struct Archive;
+  class OpenMember;
+  OpenMember Open(const std::string& name);
+  OpenMember OpenWithinBudget(const std::string& name);
   std::string path_;
   uint64_t budget_;
   std::unique_ptr<Archive> archive_;

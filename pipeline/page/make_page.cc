@@ -41,12 +41,12 @@ std::string Thumbnail(const Image& image, int longest) {
 }
 
 // What the style of a folder adds to the field voxel by voxel, in the field's order.
-StyleLayers ReadLayers(const std::string& style_folder, int64_t voxels) {
+StyleLayers ReadLayers(const std::string& style_folder, const KeptRecords& records) {
   StyleLayers layers;
   if (const std::string file = style_folder + "/residual.npz"; std::filesystem::exists(file))
-    layers.residual = ReadResidualFile(file, voxels);
+    layers.residual = ReadResidualFile(file, records);
   if (const std::string file = style_folder + "/object.npz"; std::filesystem::exists(file))
-    layers.weight = ReadObjectFile(file, voxels).all;
+    layers.weight = ReadObjectFile(file, records).all;
   return layers;
 }
 
@@ -124,7 +124,7 @@ void AddStyle(const std::string& style_folder, const std::string& name,
               const RadianceField& source, const std::vector<Camera>& checked,
               PageContent* content, MadePage* made) {
   const StoredNetwork network = ReadNetworkFile(style_folder + "/network.npz");
-  const StyleLayers layers = ReadLayers(style_folder, source.geometry->num_voxels());
+  const StyleLayers layers = ReadLayers(style_folder, {.of = source.geometry->num_voxels()});
   std::vector<int64_t> of;
   if (!layers.empty()) of = RecordsInPageOrder(content->field, *source.geometry).voxel;
   PageStyle style = EncodeStyle(network, made->field, StrengthOf(style_folder),

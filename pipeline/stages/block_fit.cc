@@ -5,7 +5,7 @@
 #include <utility>
 
 #include "kernels/base/error.h"
-#include "kernels/splats/cpu/splat_frame.h"
+#include "kernels/splats/cpu/seen_by_cameras.h"
 #include "kernels/splats/population_change.h"
 #include "kernels/splats/splat_field.h"
 #include "pipeline/capture/measured_depths.h"
@@ -33,7 +33,7 @@ SceneBox BoxOf(const StoredField& stored) {
 // The photos of a block, and what of the splats around it they see.
 struct BlockInput {
   SplatPhotos photos;
-  std::vector<bool> seen;  // [splats]
+  std::vector<uint8_t> seen;  // [splats]
 };
 
 BlockInput ReadInput(const WorkingViews& views, const StoredField& around,
@@ -46,18 +46,16 @@ BlockInput ReadInput(const WorkingViews& views, const StoredField& around,
       PointsOfViews(views.capture(), of, around.field_from_world, &notes);
   for (const std::string& note : notes) console->Info(note);
   BlockInput input;
-  input.seen.resize(static_cast<size_t>(splats.count));
-  SplatFrame frame;
+  std::vector<Camera> cameras;
   for (size_t v = 0; v < of.size(); ++v) {
     ReportOrThrow(progress, static_cast<double>(v), static_cast<double>(of.size()), "photos");
     const Image photo = views.PhotoToFit(of[v]);
     if (photo.empty()) continue;
     const Camera camera = views.CameraOf(of[v]);
     input.photos.Add({camera, &photo, points[v]});
-    MakeSplatFrame(splats, camera.Undistorted(), options, &frame);
-    for (int64_t i = 0; i < splats.count; ++i)
-      if (!frame.box[static_cast<size_t>(i)].empty()) input.seen[static_cast<size_t>(i)] = true;
+    cameras.push_back(camera.Undistorted());
   }
+  MarkSeenSplats(splats, cameras, options, &input.seen);
   if (input.photos.count() == 0)
     throw SceneError("the masks leave nothing of the photos that see a block", "",
                      "give fewer --blocks");
@@ -115,7 +113,7 @@ void FitBlock(const RunContext& context, const WorkingViews& views, const Stored
   start.background = splats.background;
   const auto is_held = [&](int64_t i) { return space.held.Contains(splats.mean + 3 * i); };
   AppendSplats(
-      splats, [&](int64_t i) { return !is_held(i) && input.seen[static_cast<size_t>(i)]; },
+      splats, [&](int64_t i) { return !is_held(i) && input.seen[static_cast<size_t>(i)] != 0; },
       &start);
   const int64_t frozen = start.count();
   AppendSplats(splats, is_held, &start);

@@ -51,6 +51,14 @@ std::vector<FrameUnit> UnitsOfPart(const std::vector<FrameUnit>& units,
   return own;
 }
 
+std::vector<Camera> CamerasOf(const std::vector<FrameUnit>& units) {
+  std::vector<Camera> cameras;
+  for (const FrameUnit& unit : units)
+    cameras.insert(cameras.end(), unit.set->cameras.begin() + unit.begin,
+                   unit.set->cameras.begin() + unit.end);
+  return cameras;
+}
+
 std::function<void(const FrameSet&)> TickOf(const std::vector<FrameUnit>& units,
                                             const ProgressFunction& progress) {
   double work = 0;

@@ -29,6 +29,8 @@ std::vector<FrameUnit> UnitsOf(const std::vector<FrameSet>& sets);
 std::vector<FrameUnit> UnitsOfPart(const std::vector<FrameUnit>& units,
                                    const std::string& part);
 
+std::vector<Camera> CamerasOf(const std::vector<FrameUnit>& units);
+
 // To be called before each of their frames, with its set: reports how much is done, and throws
 // as ReportOrThrow.
 std::function<void(const FrameSet&)> TickOf(const std::vector<FrameUnit>& units,

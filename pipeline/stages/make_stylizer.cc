@@ -70,7 +70,7 @@ std::unique_ptr<ViewStylizer> MakeColorMethod(StyleMethodKind kind, const StyleO
 class ShownParts {
  public:
   explicit ShownParts(const RunContext& context)
-      : stored_(ReadFieldFile(context.workspace->Path("field.npz"))),
+      : stored_(ReadFieldGeometry(context.workspace->Path("field.npz"))),
         views_(context.Views().InField(stored_)),
         renderer_(stored_.field, ChooseBackend(context.settings.run.device,
                                                context.settings.run.reproducible)) {}

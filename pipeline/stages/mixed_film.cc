@@ -8,6 +8,7 @@
 #include "kernels/base/error.h"
 #include "kernels/field/pad_sh_basis.h"
 #include "pipeline/fields/film_timing.h"
+#include "pipeline/fields/seen_field.h"
 #include "pipeline/images/video_writer.h"
 #include "pipeline/stages/styled_field.h"
 #include "pipeline/workspace/style_folders.h"
@@ -103,10 +104,16 @@ void WritePathFilm(const std::string& folder, const KeyframePath& path, const Pa
     names.push_back(film.styles[i]);
   }
   CheckResults(folder, names);
-  StoredField source = ReadFieldFile(folder + "/field.npz");
+  const std::string field = folder + "/field.npz";
+  const NdcSpace ndc = ReadFieldGeometry(field).ndc;
+  std::vector<Camera> cameras;
+  for (int i = 0; i < film.frames; ++i)
+    cameras.push_back(CameraOfKeyframe(path.At(path.Seconds() * i / (film.frames - 1)),
+                                       film.width, film.height, ndc));
+  StoredField source = ReadSeenField(field, cameras);
   std::vector<StoredField> styles;
   for (const std::string& name : names)
-    styles.push_back(ReadStyledField(folder, StyleFolder(folder, name), 1));
+    styles.push_back(StyledFieldOf(source, StyleFolder(folder, name), 1));
   MakeMixable(folder, names, &source, &styles);
   MixRenderer renderer(source.field, styles, nullptr, backend);
   VideoWriter writer(file, film.width, film.height, film.fps);
@@ -115,9 +122,7 @@ void WritePathFilm(const std::string& folder, const KeyframePath& path, const Pa
     const Keyframe key = path.At(path.Seconds() * i / (film.frames - 1));
     std::vector<double> weights;
     for (const size_t k : shown) weights.push_back(key.weights[k]);
-    writer.Add(renderer.With(weights)
-                   .Render(CameraOfKeyframe(key, film.width, film.height, source.ndc))
-                   .color);
+    writer.Add(renderer.With(weights).Render(cameras[static_cast<size_t>(i)]).color);
   }
   writer.Finish();
 }

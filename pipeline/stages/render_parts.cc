@@ -10,6 +10,7 @@
 #include "evaluate/seen_by_few.h"
 #include "kernels/base/error.h"
 #include "pipeline/fields/film_timing.h"
+#include "pipeline/fields/seen_field.h"
 #include "pipeline/files/atomic_file.h"
 #include "pipeline/files/npz_file.h"
 #include "pipeline/files/text.h"
@@ -116,8 +117,8 @@ void RenderUnit(const FrameUnit& unit, const SeenByFewRecorder& seen,
 void RenderPart(const Stage& stage, RunContext* context) {
   Console* const console = context->console;
   const std::string title = "part " + context->parts.part + " of the frames and films";
-  StoredField before = ReadFieldFile(context->workspace->Path("field.npz"));
-  const FramePlan plan = PlanFrames(*context, before);
+  const std::string field = context->workspace->Path("field.npz");
+  const FramePlan plan = PlanFrames(*context, ReadFieldGeometry(field));
   const SharedWork work = PartsOf(*context, stage.inputs);
   const std::string& folder = work.path();
   std::vector<FrameUnit> units = UnitsOfPart(UnitsOf(plan.sets), context->parts.part);
@@ -128,7 +129,7 @@ void RenderPart(const Stage& stage, RunContext* context) {
   work.Begin();
   console->Info(title + ": " + TextOf(units));
   console->BeginStage("render", title);
-  SceneFrames frames(context, plan, std::move(before), [](StoredField) {});
+  SceneFrames frames(context, plan, ReadSeenField(field, CamerasOf(units)), [](StoredField) {});
   const SeenByFewRecorder seen(plan.views, plan.near);
   const auto tick = TickOf(units, console->StageProgress());
   for (const FrameUnit& unit : units)
@@ -199,7 +200,7 @@ std::string TextOf(const std::set<std::string>& words) {
 void RequireParts(const Stage& stage, const RunContext& context) {
   const SharedWork work = PartsOf(context, stage.inputs);
   const FramePlan plan =
-      PlanFrames(context, ReadFieldFile(context.workspace->Path("field.npz")));
+      PlanFrames(context, ReadFieldGeometry(context.workspace->Path("field.npz")));
   const std::vector<FrameUnit> units = UnitsOf(plan.sets);
   const std::string& folder = work.path();
   std::vector<FrameUnit> missing = units;

@@ -71,8 +71,7 @@ SceneFrames::SceneFrames(RunContext* context, const FramePlan& plan, StoredField
   masks_ = OpenObjectMasks(settings, plan.views);
   if (masks_ != nullptr)
     object_ = std::make_unique<CoverageRenderer>(
-        before.field, ReadObjectFile(context->style->Path("object.npz"),
-                                     before.field.geometry->num_voxels()));
+        before.field, ReadObjectFile(context->style->Path("object.npz"), before.records));
   Prepare(std::move(before), take_styled);
   stylizer_ = MakeSceneStylizer(context, plan.views, masks_.get(),
                                 [this](const Image&, int) { return coverage_; });

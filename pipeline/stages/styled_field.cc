@@ -38,10 +38,10 @@ StoredField StyledFieldOf(StoredField source, const std::string& style, double s
   const StoredNetwork network = ReadNetworkFile(style + "/network.npz");
   std::optional<ObjectWeights> object;
   if (const std::string file = style + "/object.npz"; std::filesystem::exists(file))
-    object = ReadObjectFile(file, source.field.geometry->num_voxels());
+    object = ReadObjectFile(file, source.records);
   std::optional<VoxelResidual> residual;
   if (const std::string file = style + "/residual.npz"; std::filesystem::exists(file))
-    residual = ReadResidualFile(file, source.field.geometry->num_voxels());
+    residual = ReadResidualFile(file, source.records);
   return StyledFieldOf(std::move(source), network, strength, object ? &object->all : nullptr,
                        residual ? &*residual : nullptr);
 }

@@ -174,8 +174,10 @@ class SplatFitter {
       step.dropout =
           SplatDropout(options_.dropout * part, options_.seed, static_cast<uint64_t>(step_));
     const float splats = static_cast<float>(count());
-    update.opacity_weight = options_.opacity_weight / splats;
-    update.scale_weight = options_.scale_weight / (3 * splats);
+    const float weights =
+        is_long() && photos_.count() < options_.few_photos ? options_.few_photos_weights : 1.0f;
+    update.opacity_weight = weights * options_.opacity_weight / splats;
+    update.scale_weight = weights * options_.scale_weight / (3 * splats);
     update.seed = options_.seed;
     update.SetStep(static_cast<uint64_t>(step_), static_cast<uint64_t>(first_step_));
     engine_->Step(step);

@@ -41,6 +41,9 @@ struct SplatFitOptions {
   // than that of means fall to `fall` of what they were, so that what this stirs settles.
   int long_from = 4000;
   float dropout = 0.1f, fall = 0.1f;
+  // Long fits of fewer photos have both weights so many times.
+  int few_photos = 16;
+  float few_photos_weights = 2;
   float begin = 0;  // part of all steps that a refinement leaves out
   uint64_t seed = 0;
 

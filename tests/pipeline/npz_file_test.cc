@@ -105,6 +105,22 @@ TEST(Npz, FilledRowsAreTheArray) {
     EXPECT_EQ(next, kRows);
     EXPECT_EQ(ReadWholeFile(folder / "filled.npz", 1 << 30),
               ReadWholeFile(folder / "plain.npz", 1 << 30));
+
+    NpzReader reader(folder / "plain.npz", 1 << 30);
+    int64_t read = 0, times = 0;
+    reader.ReadRows("a", [&](int64_t first, const NpzArray& rows) {
+      ++times;
+      ASSERT_EQ(first, read);
+      ASSERT_EQ(rows.shape.size(), 2u);
+      ASSERT_TRUE(std::equal(rows.As<float>(), rows.As<float>() + rows.num_elements(),
+                             whole.data() + first * kColumns));
+      read += rows.shape[0];
+    });
+    EXPECT_EQ(read, kRows);
+    EXPECT_GT(times, 2);
+    reader.ReadRows("none", [](int64_t, const NpzArray& rows) {
+      EXPECT_EQ(rows.shape, (std::vector<int64_t>{0, 4}));
+    });
   }
 }
 

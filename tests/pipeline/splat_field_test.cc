@@ -13,7 +13,7 @@
 #include "kernels/splats/covariance.h"
 #include "kernels/splats/rendered_splats.h"
 #include "pipeline/capture/working_views.h"
-#include "pipeline/fields/field_file.h"
+#include "pipeline/fields/seen_field.h"
 #include "pipeline/fields/splat_checkpoint.h"
 #include "pipeline/images/still_file.h"
 #include "pipeline/run/fit_kind.h"
@@ -96,6 +96,40 @@ TEST(SplatField, AFileKeepsMeansAndRoundsTheRestToHalves) {
     WriteFieldFile(folder / "again.npz", in);
     EXPECT_EQ(testing::ReadText(folder / "again.npz"), testing::ReadText(folder / "field.npz"));
   }
+}
+
+TEST(SplatField, CamerasReadWhatTheySee) {
+  const TemporaryFolder folder;
+  WriteFieldFile(folder / "field.npz", {SmallSplatField(300, 9), {}, {}});
+  const StoredField whole = ReadFieldFile(folder / "field.npz");
+  EXPECT_TRUE(whole.records.all);
+  EXPECT_EQ(whole.records.of, 300);
+  Camera narrow = SplatCameraOf(40, 30);
+  narrow.fx *= 6, narrow.fy *= 6;
+  Camera aside = narrow;
+  aside.cx = -60;
+  for (const std::vector<Camera>& cameras : {std::vector{narrow}, std::vector{narrow, aside}}) {
+    const StoredField seen = ReadSeenField(folder / "field.npz", cameras);
+    const KeptRecords& records = seen.records;
+    ASSERT_EQ(records.of, 300);
+    ASSERT_FALSE(records.all);
+    ASSERT_EQ(std::ssize(records.kept), seen.field.geometry->num_voxels());
+    EXPECT_GT(std::ssize(records.kept), 3);
+    EXPECT_LT(std::ssize(records.kept), 290);
+    const auto logits = whole.field.geometry->splats.opacity_logit;
+    EXPECT_TRUE(Same(records.Pick(std::vector<float>(logits.begin(), logits.end())),
+                     seen.field.geometry->splats.opacity_logit));
+    for (const Camera& camera : cameras)
+      EXPECT_EQ(FieldRenderer(seen.field, Backend::kCpu).Render(camera).color.pixels,
+                FieldRenderer(whole.field, Backend::kCpu).Render(camera).color.pixels);
+  }
+  Camera away = narrow;
+  away.cx = 1e6;
+  EXPECT_EQ(ReadSeenField(folder / "field.npz", {away}).records.kept.size(), 1u);
+
+  const StoredField shapes = ReadFieldGeometry(folder / "field.npz");
+  EXPECT_TRUE(Same(shapes.field.geometry->splats.mean, whole.field.geometry->splats.mean));
+  EXPECT_EQ(shapes.field.appearance.basis, 1);
 }
 
 // Records of voxels have no room for degree 3.

@@ -314,6 +314,24 @@ TEST_F(SplatFit, DegreeThreeIsFitted) {
   EXPECT_EQ(moved.size(), 16u);
 }
 
+// Both weights count more in long fits of few photos, and in no others.
+TEST_F(SplatFit, LongFitsOfFewPhotosLeaveSmallerSplats) {
+  fit_.steps = 200;
+  const auto volume = [this](int long_from, int few_photos) {
+    fit_.long_from = long_from;
+    fit_.few_photos = few_photos;
+    fit_.few_photos_weights = 8;
+    const Splats splats = FitWith().splats;
+    double sum = 0;
+    for (const float value : splats.log_scale) sum += std::exp(double{value});
+    return sum / static_cast<double>(splats.log_scale.size());
+  };
+  const int photos = static_cast<int>(std::ssize(views_));
+  const double many = volume(0, photos);
+  EXPECT_LT(volume(0, photos + 1), 0.9 * many);
+  EXPECT_EQ(volume(1000, photos), volume(1000, photos + 1));
+}
+
 TEST_F(SplatFit, SameBitsForAnyThreadCount) {
   fit_.steps = 120;
   const auto with = [&](int n) {
