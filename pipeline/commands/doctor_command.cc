@@ -11,7 +11,7 @@
 #include "kernels/process/child_process.h"
 #include "pipeline/commands/command.h"
 #include "pipeline/images/libraries.h"
-#include "pipeline/networks/fetch_file.h"
+#include "pipeline/program/fetch_file.h"
 #include "pipeline/program/memory.h"
 
 namespace regrade {

@@ -8,13 +8,13 @@
 #include "pipeline/capture/bare_cameras.h"
 #include "pipeline/commands/command.h"
 #include "pipeline/commands/compared_renders.h"
+#include "pipeline/fields/compressed_ply_writer.h"
+#include "pipeline/fields/placed_splats.h"
+#include "pipeline/fields/read_splats.h"
+#include "pipeline/fields/splat_glb.h"
+#include "pipeline/fields/splat_ply.h"
+#include "pipeline/fields/spz_writer.h"
 #include "pipeline/files/json_file.h"
-#include "pipeline/splat_files/compressed_ply_writer.h"
-#include "pipeline/splat_files/placed_splats.h"
-#include "pipeline/splat_files/read_splats.h"
-#include "pipeline/splat_files/splat_glb.h"
-#include "pipeline/splat_files/splat_ply.h"
-#include "pipeline/splat_files/spz_writer.h"
 
 namespace regrade {
 namespace {

@@ -3,7 +3,7 @@
 
 #include "kernels/base/error.h"
 #include "pipeline/commands/command.h"
-#include "pipeline/networks/known_networks.h"
+#include "pipeline/program/known_networks.h"
 
 namespace regrade {
 

@@ -1,6 +1,6 @@
 // regrade synth: writes a synthetic capture with its exact ground truth.
+#include "pipeline/capture/synth_capture.h"
 #include "pipeline/commands/command.h"
-#include "pipeline/synth/synth_capture.h"
 
 namespace regrade {
 

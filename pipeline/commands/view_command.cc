@@ -19,11 +19,11 @@
 #include "pipeline/commands/command.h"
 #include "pipeline/commands/page_styles.h"
 #include "pipeline/files/atomic_file.h"
+#include "pipeline/page/view_session.h"
 #include "pipeline/program/interrupt.h"
 #include "pipeline/report/html_text.h"
 #include "pipeline/run/resolve_settings.h"
 #include "pipeline/run/run_settings.h"
-#include "pipeline/view/view_session.h"
 #include "pipeline/workspace/style_folders.h"
 #include "pipeline/workspace/workspace.h"
 

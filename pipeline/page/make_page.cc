@@ -20,6 +20,7 @@
 #include "pipeline/page/check_page.h"
 #include "pipeline/page/color_code.h"
 #include "pipeline/page/keyframes.h"
+#include "pipeline/page/most_shown.h"
 #include "pipeline/page/page_file.h"
 #include "pipeline/run/run_file.h"
 #include "pipeline/workspace/style_folders.h"
@@ -121,10 +122,11 @@ std::string CheckLine(const std::string& what, const PageCheck& check) {
 // compared with the exact style in the views `checked`; the source's colours are read only
 // then.
 void AddStyle(const std::string& style_folder, const std::string& name,
-              const RadianceField& source, const std::vector<Camera>& checked,
+              const StoredField& stored, const std::vector<Camera>& checked,
               PageContent* content, MadePage* made) {
   const StoredNetwork network = ReadNetworkFile(style_folder + "/network.npz");
-  const StyleLayers layers = ReadLayers(style_folder, {.of = source.geometry->num_voxels()});
+  const RadianceField& source = stored.field;
+  const StyleLayers layers = ReadLayers(style_folder, stored.records);
   std::vector<int64_t> of;
   if (!layers.empty()) of = RecordsInPageOrder(content->field, *source.geometry).voxel;
   PageStyle style = EncodeStyle(network, made->field, StrengthOf(style_folder),
@@ -147,18 +149,42 @@ void AddStyle(const std::string& style_folder, const std::string& name,
   content->styles.push_back(std::move(style));
 }
 
+// The field, or of one with more splats than the page may have those that photos show most.
+StoredField ReadFieldOfPage(const std::string& folder, const PageOptions& options,
+                            MadePage* made) {
+  const std::string path = folder + "/field.npz";
+  if (options.most_splats == 0) return ReadFieldFile(path);
+  const StoredField all = ReadFieldGeometry(path);
+  if (!all.field.geometry->splats.on() || all.records.of <= options.most_splats)
+    return ReadFieldFile(path);
+  std::vector<Camera> photos;
+  for (const Camera& camera :
+       ReadWorkingViews(folder + "/poses", kChecked, 0).InField(all).Cameras())
+    photos.push_back(camera.Undistorted());
+  StoredField part = ReadPartOfField(path, [&](const RadianceField& field) {
+    return MostShown(field, photos, options.most_splats);
+  });
+  const PageCheck check =
+      CheckPage(ReadFieldFile(path).field, part.field, CheckedViews(photos, kChecked));
+  made->report.push_back(Concat("the page has those ", part.field.geometry->num_voxels(),
+                                " of ", all.records.of, " splats that photos show most") +
+                         Format(": to a picture of all, worst of %d views, %.1f dB (mean %.1f)",
+                                check.views, check.worst_db, check.mean_db));
+  return part;
+}
+
 }  // namespace
 
 MadePage MakePage(const std::string& folder, const std::vector<std::string>& styles,
                   const PageOptions& options, const ProgressFunction& progress) {
   const int steps = 2 + static_cast<int>(styles.size());
   ReportOrThrow(progress, 0, steps);
-  StoredField stored = ReadFieldFile(folder + "/field.npz");
+  MadePage made;
+  StoredField stored = ReadFieldOfPage(folder, options, &made);
   const WorkingViews views = ReadWorkingViews(folder + "/poses", kChecked, 0).InField(stored);
   PageContent content;
   content.served = options.served;
   EncodeScene(stored.field, views, options, &content);
-  MadePage made;
   if (stored.field.appearance.basis > kCodeHarmonics)
     made.report.push_back("the page shows harmonics up to degree 2; higher ones are left out");
   if (!options.check) stored.field.appearance = {};  // fields have gigabytes
@@ -174,7 +200,7 @@ MadePage MakePage(const std::string& folder, const std::vector<std::string>& sty
   content.poster = EncodeJpeg(RenderHome(made.field, HomeOf(content)), kQuality);
   for (size_t i = 0; i < styles.size(); ++i) {
     ReportOrThrow(progress, 1 + static_cast<int64_t>(i), steps);
-    AddStyle(StyleFolder(folder, styles[i]), styles[i], stored.field, checked, &content, &made);
+    AddStyle(StyleFolder(folder, styles[i]), styles[i], stored, checked, &content, &made);
     if (options.names != "off") content.styles.back().header["name"] = styles[i];
   }
   ReportOrThrow(progress, steps - 1, steps);

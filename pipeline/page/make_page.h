@@ -16,7 +16,8 @@ struct PageOptions {
   double step = 0.03;
   bool check = false;
   std::string names = "on";
-  bool served = false;  // by `regrade view`
+  bool served = false;      // by `regrade view`
+  int64_t most_splats = 0;  // see MostShown; 0 takes all
 
   template <typename Bind>
   void Describe(Bind& bind) {
@@ -42,7 +43,7 @@ struct MadePage {
   const char* records_name = "";         // see RecordsName
   int64_t coarse_bytes = 0;              // of what is shown first
   std::vector<int64_t> style_bytes;
-  std::vector<std::string> report;  // what is left out, and the lines of --check
+  std::vector<std::string> report;  // what is left out, at what cost, and the lines of --check
   RadianceField field;              // as the page has it
   PageVoxels places;                // its records, as the page orders them
 };

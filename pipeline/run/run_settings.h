@@ -148,7 +148,7 @@ struct PageChoice {
   void Describe(Bind& bind) {
     bind("page", page,
          {.help = "writes scene.html, the scene and its style to walk through in a browser: "
-                  "auto does where it stays below 25 MB",
+                  "auto keeps it below 25 MB, of many splats with those that photos show most",
           .choices = "auto|on|off"});
   }
 };

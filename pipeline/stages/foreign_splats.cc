@@ -6,11 +6,11 @@
 #include "kernels/base/error.h"
 #include "kernels/field/spherical_harmonics.h"
 #include "kernels/splats/splat_field.h"
+#include "pipeline/fields/placed_splats.h"
+#include "pipeline/fields/read_splats.h"
 #include "pipeline/files/text.h"
 #include "pipeline/program/memory.h"
 #include "pipeline/run/plan.h"
-#include "pipeline/splat_files/placed_splats.h"
-#include "pipeline/splat_files/read_splats.h"
 #include "reconstruct/views/splat_extent.h"
 
 namespace regrade {

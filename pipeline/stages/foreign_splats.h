@@ -4,8 +4,8 @@
 #include <string>
 
 #include "kernels/field/radiance_field.h"
+#include "pipeline/fields/splat_scene.h"
 #include "pipeline/program/console.h"
-#include "pipeline/splat_files/splat_scene.h"
 
 namespace regrade {
 

@@ -7,7 +7,7 @@
 
 #include "pipeline/capture/object_masks.h"
 #include "pipeline/files/json_file.h"
-#include "pipeline/networks/known_networks.h"
+#include "pipeline/program/known_networks.h"
 #include "pipeline/run/run_context.h"
 #include "stylize/image/masked_stylizer.h"
 #include "stylize/image/view_stylizer.h"

@@ -4,9 +4,9 @@
 
 #include "kernels/base/error.h"
 #include "kernels/render/field_renderer.h"
+#include "pipeline/fields/read_splats.h"
 #include "pipeline/program/device_choice.h"
 #include "pipeline/run/fit_kind.h"
-#include "pipeline/splat_files/read_splats.h"
 #include "pipeline/stages/foreign_splats.h"
 #include "pipeline/stages/given_field.h"
 #include "pipeline/stages/splat_points.h"

@@ -8,9 +8,9 @@
 
 #include "kernels/base/error.h"
 #include "pipeline/fields/network_file.h"
-#include "pipeline/splat_files/placed_splats.h"
-#include "pipeline/splat_files/restyled_ply.h"
-#include "pipeline/splat_files/splat_ply.h"
+#include "pipeline/fields/placed_splats.h"
+#include "pipeline/fields/restyled_ply.h"
+#include "pipeline/fields/splat_ply.h"
 
 namespace regrade {
 namespace {

@@ -2,7 +2,7 @@
 #include <algorithm>
 #include <cstring>
 
-#include "pipeline/networks/tensor_bundle.h"
+#include "pipeline/program/tensor_bundle.h"
 #include "tests/fuzz/fuzz_support.h"
 #include "tests/fuzz/mutate.h"
 

@@ -1,5 +1,5 @@
 // Fuzz target: requests to the server of `regrade view`.
-#include "pipeline/view/local_server.h"
+#include "pipeline/page/local_server.h"
 #include "tests/fuzz/fuzz_support.h"
 #include "tests/fuzz/mutate.h"
 #include "tests/support/hostile_requests.h"

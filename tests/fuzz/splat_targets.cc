@@ -3,8 +3,8 @@
 #include <cmath>
 
 #include "kernels/splats/render_picture.h"
-#include "pipeline/splat_files/read_splats.h"
-#include "pipeline/splat_files/restyled_ply.h"
+#include "pipeline/fields/read_splats.h"
+#include "pipeline/fields/restyled_ply.h"
 #include "tests/fuzz/fuzz_support.h"
 #include "tests/fuzz/mutate.h"
 #include "tests/support/small_splats.h"

@@ -1,13 +1,13 @@
 // Cost tables: variants, stored measurements, the Pareto front, and predictions.
-#include "pipeline/tradeoff/cost_table.h"
+#include "pipeline/study/cost_table.h"
 
 #include <gtest/gtest.h>
 
 #include <algorithm>
 
 #include "pipeline/report/cost_rows.h"
-#include "pipeline/tradeoff/duration_estimate.h"
-#include "pipeline/tradeoff/prediction.h"
+#include "pipeline/study/duration_estimate.h"
+#include "pipeline/study/prediction.h"
 #include "tests/support/expect_error.h"
 #include "tests/support/temporary_folder.h"
 

@@ -1,6 +1,6 @@
 // The server of `regrade view`: each hostile request with its answer, and limits on what a
 // client may hold.
-#include "pipeline/view/local_server.h"
+#include "pipeline/page/local_server.h"
 
 #include <gtest/gtest.h>
 #include <sys/resource.h>

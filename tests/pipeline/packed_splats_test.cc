@@ -5,9 +5,9 @@
 
 #include "kernels/base/random.h"
 #include "kernels/splats/render_picture.h"
+#include "pipeline/fields/read_splats.h"
 #include "pipeline/files/deflate.h"
 #include "pipeline/files/zstd.h"
-#include "pipeline/splat_files/read_splats.h"
 #include "tests/support/data.h"
 #include "tests/support/expect_error.h"
 #include "tests/support/small_splats.h"

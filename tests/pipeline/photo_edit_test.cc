@@ -12,7 +12,7 @@
 #include "kernels/image/resize.h"
 #include "kernels/synthetic/ray_trace.h"
 #include "kernels/synthetic/synthetic_scene.h"
-#include "pipeline/synth/synth_grade.h"
+#include "pipeline/capture/synth_grade.h"
 #include "tests/support/expect_error.h"
 #include "tests/support/pictures.h"
 #include "tests/support/record_error.h"

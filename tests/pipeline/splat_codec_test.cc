@@ -11,9 +11,11 @@
 #include "kernels/field/pad_sh_basis.h"
 #include "kernels/image/decibels.h"
 #include "kernels/render/field_renderer.h"
+#include "kernels/splats/cpu/seen_by_cameras.h"
 #include "kernels/splats/extent.h"
 #include "kernels/splats/splat_field.h"
 #include "pipeline/files/deflate.h"
+#include "pipeline/page/most_shown.h"
 #include "pipeline/page/splat_numbers.h"
 #include "pipeline/page/style_codec.h"
 #include "tests/support/expect_error.h"
@@ -135,6 +137,22 @@ TEST(SplatCodec, FirstComeThoseThatContributeMost) {
 }
 
 // What a style adds splat by splat needs the same order from both fields.
+TEST(MostShown, WhatNoCameraSeesGoesFirst) {
+  const RadianceField field = FieldOf(300, 1);
+  Camera camera = testing::SplatCameraOf(40, 30);
+  camera.fx *= 6, camera.fy *= 6;
+  std::vector<uint8_t> seen;
+  MarkSeenSplats(SplatsOf(field), {camera}, SplatOptionsOf(field), &seen);
+  const auto count = std::ranges::count(seen, 1);
+  ASSERT_GT(count, 20);
+  ASSERT_LT(count, 290);
+  for (const int64_t most : {int64_t{5}, int64_t{count} / 2, int64_t{300}, int64_t{1000}}) {
+    const std::vector<uint8_t> marked = MostShown(field, {camera}, most);
+    EXPECT_EQ(std::ranges::count(marked, 1), std::min<int64_t>(most, 300));
+    for (size_t i = 0; i < seen.size() && most < count; ++i) EXPECT_LE(marked[i], seen[i]);
+  }
+}
+
 TEST(SplatCodec, OrderIsThatOfTheDecodedField) {
   const RadianceField field = FieldOf(500, 4);
   const PageField page = EncodeField(field, kSplatPageStep);

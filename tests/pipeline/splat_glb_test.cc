@@ -1,5 +1,5 @@
 // Splats in binary glTF: what the format demands, and the picture.
-#include "pipeline/splat_files/splat_glb.h"
+#include "pipeline/fields/splat_glb.h"
 
 #include <gtest/gtest.h>
 

@@ -8,8 +8,8 @@
 #include "kernels/image/decibels.h"
 #include "kernels/image/resize.h"
 #include "kernels/splats/cpu/render_splats.h"
+#include "pipeline/fields/read_splats.h"
 #include "pipeline/images/image_file.h"
-#include "pipeline/splat_files/read_splats.h"
 #include "tests/support/data.h"
 
 namespace regrade {

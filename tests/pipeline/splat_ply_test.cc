@@ -1,13 +1,13 @@
 // PLY files of Gaussians: what the reader accepts, and colours that are written back.
-#include "pipeline/splat_files/splat_ply.h"
+#include "pipeline/fields/splat_ply.h"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 
 #include "kernels/splats/splat_field.h"
-#include "pipeline/splat_files/read_splats.h"
-#include "pipeline/splat_files/restyled_ply.h"
+#include "pipeline/fields/read_splats.h"
+#include "pipeline/fields/restyled_ply.h"
 #include "tests/support/data.h"
 #include "tests/support/expect_error.h"
 #include "tests/support/small_splats.h"

@@ -6,12 +6,12 @@
 #include <filesystem>
 
 #include "kernels/splats/covariance.h"
+#include "pipeline/fields/compressed_ply_writer.h"
+#include "pipeline/fields/morton_order.h"
+#include "pipeline/fields/read_splats.h"
+#include "pipeline/fields/splat_record.h"
+#include "pipeline/fields/spz_writer.h"
 #include "pipeline/files/deflate.h"
-#include "pipeline/splat_files/compressed_ply_writer.h"
-#include "pipeline/splat_files/morton_order.h"
-#include "pipeline/splat_files/read_splats.h"
-#include "pipeline/splat_files/splat_record.h"
-#include "pipeline/splat_files/spz_writer.h"
 #include "tests/support/data.h"
 #include "tests/support/small_splats.h"
 #include "tests/support/temporary_folder.h"

@@ -1,5 +1,5 @@
 // Synthetic captures on disk: complete, repeatable, and with exact ground truth.
-#include "pipeline/synth/synth_capture.h"
+#include "pipeline/capture/synth_capture.h"
 
 #include <gtest/gtest.h>
 
@@ -14,10 +14,10 @@
 #include "evaluate/flow_file.h"
 #include "kernels/base/error.h"
 #include "kernels/synthetic/ray_trace.h"
+#include "pipeline/capture/synth_effects.h"
 #include "pipeline/capture/transforms_json.h"
 #include "pipeline/files/json_file.h"
 #include "pipeline/images/image_file.h"
-#include "pipeline/synth/synth_effects.h"
 #include "reconstruct/colmap/colmap_model.h"
 #include "tests/support/expect_error.h"
 #include "tests/support/temporary_folder.h"

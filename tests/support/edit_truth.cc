@@ -8,7 +8,7 @@
 
 #include "kernels/synthetic/ray_trace.h"
 #include "kernels/synthetic/synthetic_scene.h"
-#include "pipeline/synth/synth_grade.h"
+#include "pipeline/capture/synth_grade.h"
 #include "stylize/linear_map.h"
 
 namespace regrade::testing {

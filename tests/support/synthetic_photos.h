@@ -9,9 +9,9 @@
 #include <vector>
 
 #include "kernels/synthetic/ray_trace.h"
+#include "pipeline/capture/synth_effects.h"
 #include "pipeline/capture/working_views.h"
 #include "pipeline/images/image_file.h"
-#include "pipeline/synth/synth_effects.h"
 #include "pipeline/workspace/output_names.h"
 #include "reconstruct/colmap/colmap_model.h"
 

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "pipeline/synth/synth_capture.h"
+#include "pipeline/capture/synth_capture.h"
 #include "tests/support/run_program.h"
 #include "tests/support/temporary_folder.h"
 

@@ -1,5 +1,5 @@
 // Under `regrade view`: the program behind the page learns styles and renders exact films. The
-// address's fragment has the token; see pipeline/view/view_session.h.
+// address's fragment has the token; see pipeline/page/view_session.h.
 
 class Live {
   static begin() {
