@@ -127,11 +127,13 @@ class NpzReader::OpenMember {
   OpenMember(zip_t* zip, const ZipMember& member, std::string where)
       : where_(std::move(where)),
         file_(zip_fopen_index(zip, member.index, 0), &zip_fclose),
+        bytes_(member.bytes),
         left_(member.bytes) {
     if (file_ == nullptr) throw InputError("cannot be unpacked", where_);
     ReadHeader();
   }
 
+  uint64_t bytes() const { return bytes_; }  // with the header
   const NpyHeader& header() const { return header_; }
 
   void Read(void* to, uint64_t size) {
@@ -188,7 +190,7 @@ class NpzReader::OpenMember {
 
   std::string where_;
   std::unique_ptr<zip_file_t, decltype(&zip_fclose)> file_;
-  uint64_t left_;
+  uint64_t bytes_, left_;
   NpyHeader header_;
   std::string head_;  // data that came with a header shorter than the fixed part
 };
@@ -202,12 +204,11 @@ NpzReader::OpenMember NpzReader::Open(const std::string& name) {
 
 NpzReader::OpenMember NpzReader::OpenWithinBudget(const std::string& name) {
   OpenMember member = Open(name);
-  const uint64_t bytes = member.header().data_bytes;
-  if (bytes > budget_)
+  if (member.bytes() > budget_)
     throw InputError(
-        Concat(bytes, " bytes, more than the ", budget_, " that may still be read"),
+        Concat(member.bytes(), " bytes, more than the ", budget_, " that may still be read"),
         path_ + ": array '" + name + "'", "give more memory with --max-memory");
-  budget_ -= bytes;
+  budget_ -= member.bytes();
   return member;
 }
 
