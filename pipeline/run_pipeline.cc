@@ -44,13 +44,14 @@ constexpr StageEntry kStages[] = {
     // the field's colours (stylize/training); its loss is in
     // stylize/field/gradient_aggregation.h, its bound in stylize/field/lipschitz_network.h
     {"stylize", StylizeStage},
-    // field.npz + network.npz -> frames/ (a ray in kernels/field/render_ray.h, the opacity of
-    // its samples in kernels/field/volume_rendering.h), films (pipeline/images/video_writer.h)
+    // field.npz + network.npz -> frames/ (a pixel of splats in kernels/splats/compositing.h, a
+    // ray through voxels in kernels/field/render_ray.h), films (pipeline/images/video_writer.h)
     {"render", RenderStage},
     // frames/ -> consistency (evaluate/consistency.h) and fidelity (evaluate/fidelity.h)
     // metrics, heatmaps/
     {"evaluate", EvaluateStage},
-    // all records -> report.json, report.html (pipeline/report)
+    // all records -> report.json, report.html (pipeline/report); the scene -> scene.html, a
+    // page to walk in (pipeline/page/make_page.h)
     {"report", ReportStage},
 };
 // clang-format on

@@ -15,6 +15,8 @@
 // / (1 - alpha_i), adds a rounding for each splat and divides by 0.01 at opaque ones; front to
 // back, with the pixel's total less what is in front, R_{i+1} = (C - ...) / T_{i+1} cancels
 // where T is small.
+//
+// Tile by tile it is cpu/splat_tile_simd.h and cuda/composite_tiles.cu, cuda/tile_adjoint.cu.
 #pragma once
 
 #include <cmath>

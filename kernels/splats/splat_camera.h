@@ -18,7 +18,7 @@ inline constexpr double kMinTransmittance = 1e-4;           // what would leave 
 // EQ(splat-dropout), Park et al. 2025 (DropGaussian), eq. 4 and 5: in each step of a fit a
 // share r of the splats, drawn anew, is left out, and the opacities of the others are divided
 // by 1 - r (up to the most of one splat): none learns to explain a photo alone, and what few
-// photos see gets gradients behind what covers it.
+// photos see gets gradients behind what covers it. How r rises: FitSplats.
 struct SplatDropout {
   float share = 0;  // r, less than 1
   float gain = 1;   // 1 / (1 - r)

@@ -8,11 +8,12 @@
 #include "kernels/render/field_renderer.h"
 #include "pipeline/capture/working_views.h"
 #include "pipeline/commands/command.h"
-#include "pipeline/fields/field_file.h"
+#include "pipeline/fields/seen_field.h"
 #include "pipeline/files/text.h"
 #include "pipeline/images/contact_sheet.h"
 #include "pipeline/images/image_file.h"
 #include "pipeline/program/run_options.h"
+#include "pipeline/run/run_file.h"
 #include "pipeline/stages/styled_field.h"
 #include "pipeline/workspace/style_folders.h"
 #include "pipeline/workspace/workspace.h"
@@ -58,15 +59,20 @@ Image Clipped(Image image) {
 
 // A row for each shown view: the photo, and each style as it is in the folder.
 std::vector<SheetRow> RowsOfStyles(const WorkingViews& views, const std::vector<int>& shown,
-                                   const std::string& folder, const Arguments& names) {
+                                   StoredField geometry, const std::string& folder,
+                                   const Arguments& names) {
   std::vector<SheetRow> rows(shown.size());
   for (size_t k = 0; k < rows.size(); ++k)
     rows[k].push_back({views.Photo(shown[k]), views.View(shown[k]).file});
+  std::vector<Camera> cameras;
+  for (const int i : shown) cameras.push_back(views.CameraOf(i));
+  const StoredField seen = SeenPart(std::move(geometry), folder + "/field.npz", cameras);
   for (const std::string& name : names) {
-    const StoredField styled = ReadStyledField(folder, StyleFolder(folder, name));
+    const std::string style = StyleFolder(folder, name);
+    const StoredField styled = StyledFieldOf(seen, style, StrengthOf(style));
     const FieldRenderer renderer(styled.field, Backend::kCpu);
     for (size_t k = 0; k < rows.size(); ++k)
-      rows[k].push_back({Clipped(renderer.Render(views.CameraOf(shown[k])).color), name});
+      rows[k].push_back({Clipped(renderer.Render(cameras[k]).color), name});
   }
   return rows;
 }
@@ -105,11 +111,12 @@ void RunContactSheet(const Command& command, const Arguments& arguments, Console
   Workspace workspace(folder);
   const Arguments styles = StylesAmong(prepared->words, console);
   CheckResults(folder, styles);
-  const StoredField stored = ReadFieldFile(workspace.Path("field.npz"));
+  StoredField geometry = ReadFieldGeometry(workspace.Path("field.npz"));
   const WorkingViews views =
-      ReadWorkingViews(workspace.Path("poses"), sheet.size, 0).InField(stored);
+      ReadWorkingViews(workspace.Path("poses"), sheet.size, 0).InField(geometry);
   const std::vector<int> shown = ShownViews(views.count(), sheet.views);
-  const Image picture = MakeContactSheet(RowsOfStyles(views, shown, folder, styles));
+  const Image picture =
+      MakeContactSheet(RowsOfStyles(views, shown, std::move(geometry), folder, styles));
   WritePng8(sheet.out, picture);
   console->Info(Concat("wrote ", sheet.out, ", ", picture.width, "x", picture.height));
 }

@@ -90,9 +90,10 @@ void RenderStills(const std::string& folder, const std::string& name,
   CheckResults(folder, {name});
   constexpr int kLongest = 1 << 16;
   const std::string field = scene.Path("field.npz");
+  StoredField geometry = ReadFieldGeometry(field);
   const WorkingViews views =
       ReadWorkingViews(scene.Path("poses"), options.size > 0 ? options.size : kLongest, 0)
-          .InField(ReadFieldGeometry(field));
+          .InField(geometry);
   const Vignette vignette = ParseVignette(settings.render.vignette);
   std::vector<int> wanted;
   std::vector<Camera> cameras;
@@ -100,8 +101,8 @@ void RenderStills(const std::string& folder, const std::string& name,
     wanted.push_back(PhotoNamed(views.capture(), still));
     cameras.push_back(views.CameraOf(wanted.back()));
   }
-  const StoredField stored =
-      StyledFieldOf(ReadSeenField(field, cameras), style.folder(), settings.style.strength);
+  const StoredField stored = StyledFieldOf(SeenPart(std::move(geometry), field, cameras),
+                                           style.folder(), settings.style.strength);
   const FieldRenderer renderer(stored.field,
                                ChooseBackend(settings.run.device, settings.run.reproducible));
   for (const int i : wanted) {

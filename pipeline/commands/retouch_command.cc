@@ -8,7 +8,7 @@
 #include "pipeline/capture/photo_names.h"
 #include "pipeline/commands/command.h"
 #include "pipeline/dry_run.h"
-#include "pipeline/fields/field_file.h"
+#include "pipeline/fields/seen_field.h"
 #include "pipeline/files/atomic_file.h"
 #include "pipeline/files/json_file.h"
 #include "pipeline/files/text.h"
@@ -100,12 +100,14 @@ void WriteRender(const std::string& path, int view, RunContext* context) {
   if (!fs::exists(field))
     throw InputError("holds no reconstruction", settings.run.out,
                      "make one with `regrade run` or `regrade reconstruct`");
-  const StoredField stored = ReadFieldFile(field);
   const Backend backend = ChooseBackend(settings.run.device, settings.run.reproducible);
   constexpr int kLongest = 1 << 16;
-  const WorkingViews views =
-      ReadWorkingViews(context->workspace->Path("poses"), kLongest, 0).InField(stored);
-  WriteStill(path, FieldRenderer(stored.field, backend).Render(views.CameraOf(view)).color);
+  StoredField geometry = ReadFieldGeometry(field);
+  const Camera camera = ReadWorkingViews(context->workspace->Path("poses"), kLongest, 0)
+                            .InField(geometry)
+                            .CameraOf(view);
+  const StoredField stored = SeenPart(std::move(geometry), field, {camera});
+  WriteStill(path, FieldRenderer(stored.field, backend).Render(camera).color);
   context->console->Info("wrote " + path + ": edit it, and give the edit with --edited");
 }
 

@@ -74,7 +74,7 @@ Vec3f BackgroundOf(const SplatFrames& frames) {
   const fs::path field = fs::path(frames.views.cameras) / "field.npz";
   if (frames.background == "black" || frames.views.cameras.empty() || !fs::exists(field))
     return {0, 0, 0};
-  return ReadFieldFile(field.string()).field.background;
+  return ReadFieldGeometry(field.string()).field.background;
 }
 
 // Removes what an earlier call wrote, and nothing else.

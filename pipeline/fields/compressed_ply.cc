@@ -8,9 +8,9 @@
 #include <vector>
 
 #include "kernels/base/error.h"
+#include "pipeline/fields/colored_splat.h"
 #include "pipeline/fields/gaussian_ply.h"
 #include "pipeline/fields/ply_rows.h"
-#include "pipeline/fields/splat_record.h"
 #include "pipeline/files/text.h"
 
 namespace regrade {
@@ -110,9 +110,9 @@ void UnpackRotation(uint32_t packed, float* quaternion) {
 }
 
 // All but the harmonics of higher degrees. `packed` in the order of kPacked.
-SplatRecord Unpack(const Chunk& chunk, const std::array<uint32_t, 4>& packed, int basis) {
+ColoredSplat Unpack(const Chunk& chunk, const std::array<uint32_t, 4>& packed, int basis) {
   constexpr int kShift[] = {21, 11, 0}, kBits[] = {11, 10, 11};
-  SplatRecord record;
+  ColoredSplat record;
   for (size_t a = 0; a < 3; ++a) {
     const int axis = static_cast<int>(a);
     record.splat.mean[axis] = chunk.mean.At(a, Share(packed[0], kShift[a], kBits[a]));
@@ -179,7 +179,7 @@ SplatScene ReadCompressedPly(std::string_view bytes, const PlyHeader& header, ui
     rows.Next();
     std::array<uint32_t, 4> numbers{};
     for (size_t k = 0; k < 4; ++k) numbers[k] = static_cast<uint32_t>(rows.Number(packed[k]));
-    SplatRecord record = Unpack(chunks[i / kChunk], numbers, basis);
+    ColoredSplat record = Unpack(chunks[i / kChunk], numbers, basis);
     if (harmonics) {
       harmonics->Next();
       for (int k = 0; k < 3 * others; ++k)

@@ -5,7 +5,7 @@
 #include <cstring>
 #include <utility>
 
-#include "pipeline/fields/splat_record.h"
+#include "pipeline/fields/colored_splat.h"
 
 namespace regrade {
 namespace {
@@ -45,7 +45,7 @@ SplatScene ReadDotSplat(std::string_view bytes, uint64_t budget, const std::stri
   SplatCollector collector(count, 1, bytes.size(), budget, where);
   for (size_t i = 0; i < count; ++i) {
     const Record from = RecordAt(bytes, i);
-    SplatRecord to;
+    ColoredSplat to;
     for (int a = 0; a < 3; ++a) {
       to.splat.mean[a] = from.mean[a];
       to.splat.log_scale[a] = std::log(from.scale[a]);

@@ -178,10 +178,12 @@ void ReadColours(NpzReader* file, const ColourColumns& columns, const KeptRecord
   appearance->basis = columns.basis;
   const int64_t each = appearance->stride();
   const int64_t most = records.all ? records.of : std::ssize(records.kept);
-  appearance->sh.Resize(each * most);
-  if (density != nullptr) density->Resize(most);
   int64_t begin = 0;  // what is read of `most`
   file->ReadRows(NameOfColours(*file), [&](int64_t first, const NpzArray& rows) {
+    if (first == 0) {  // within the budget
+      appearance->sh.Resize(each * most);
+      if (density != nullptr) density->Resize(most);
+    }
     const int64_t next = first + rows.shape[0];
     const int64_t end =
         records.all ? next
@@ -291,6 +293,13 @@ StoredField ReadField(const std::string& path, uint64_t budget, const SplatFilte
 
 StoredField ReadFieldFile(const std::string& path, uint64_t budget) {
   return ReadField(path, budget, {}, true);
+}
+
+int64_t CountSplats(const std::string& path) {
+  NpzReader file(path, kMostField);
+  if (!file.Has("regrade_splats_mean")) return 0;
+  const std::vector<int64_t> shape = file.Describe("regrade_splats_mean").shape;
+  return shape.empty() ? 0 : shape[0];
 }
 
 StoredField ReadPartOfField(const std::string& path, const SplatFilter& keep) {

@@ -13,7 +13,7 @@
 // A field of splats has neither links nor density_data: in their place are
 // regrade_splats_mean f32[N,3], regrade_splats_log_scale f16[N,3], regrade_splats_quaternion
 // f16[N,4] (unit length), regrade_splats_opacity_logit f16[N] and regrade_splats_fit_pixel
-// i32, see SplatGeometry; radius and center are those of the box that the cameras look at.
+// f32, see SplatGeometry; radius and center are those of the box that the cameras look at.
 #pragma once
 
 #include <cstdint>
@@ -53,15 +53,18 @@ void RoundAsStored(Appearance* appearance);
 inline constexpr uint64_t kMostField = uint64_t{256} << 30;
 StoredField ReadFieldFile(const std::string& path, uint64_t budget = kMostField);
 
+// How many splats a file has; 0 of voxels.
+int64_t CountSplats(const std::string& path);
+
 // Which splats [splats] are kept, of a field without colours.
 using SplatFilter = std::function<std::vector<uint8_t>(const RadianceField& field)>;
 
 // The splats that `keep` chooses, with their colours: no others' colours are in memory, and
-// their geometry, 44 B a splat, only while the file is read. Where none is chosen, the first is
+// their geometry, 56 B a splat, only while the file is read. Where none is chosen, the first is
 // kept. Voxels are read whole.
 StoredField ReadPartOfField(const std::string& path, const SplatFilter& keep);
 
-// Splats in place of whose colours there is one coefficient, 0. Voxels are read whole.
+// Splats whose colours are one coefficient a channel, 0. Voxels are read whole.
 StoredField ReadFieldGeometry(const std::string& path);
 
 }  // namespace regrade

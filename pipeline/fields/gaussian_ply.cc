@@ -47,9 +47,9 @@ void NameWhatIsIgnored(const PlyHeader& header, const GaussianLayout& layout,
 }
 
 // Of the next `count` rows.
-std::vector<SplatRecord> NextRecords(PlyRows* rows, const GaussianLayout& layout,
-                                     uint64_t count) {
-  std::vector<SplatRecord> records(count);
+std::vector<ColoredSplat> NextRecords(PlyRows* rows, const GaussianLayout& layout,
+                                      uint64_t count) {
+  std::vector<ColoredSplat> records(count);
   const auto read = [&](PlyRows* from, uint64_t begin, uint64_t end) {
     for (uint64_t i = begin; i < end; ++i) {
       from->Next();
@@ -98,12 +98,12 @@ GaussianLayout FindGaussians(const PlyHeader& header, const std::string& where) 
   return layout;
 }
 
-SplatRecord RecordOf(const PlyRows& rows, const GaussianLayout& layout) {
+ColoredSplat RecordOf(const PlyRows& rows, const GaussianLayout& layout) {
   float v[kFirstHarmonic + 3 * kMaxBasis];
   std::ranges::transform(layout.property, v, [&rows](size_t property) {
     return static_cast<float>(rows.Number(property));
   });
-  SplatRecord record;
+  ColoredSplat record;
   record.splat = {{v[0], v[1], v[2]}, {v[3], v[4], v[5]}, {v[6], v[7], v[8], v[9]}, v[10]};
   std::copy_n(v + kFirstHarmonic, 3 * layout.basis, record.sh);
   return record;
@@ -117,7 +117,7 @@ SplatScene ReadGaussianPly(std::string_view bytes, const PlyHeader& header, uint
   SplatCollector collector(count, layout.basis, bytes.size(), budget, where);
   constexpr uint64_t kAtOnce = 1 << 16;
   for (uint64_t i = 0; i < count; i += kAtOnce)
-    for (const SplatRecord& record : NextRecords(&rows, layout, std::min(kAtOnce, count - i)))
+    for (const ColoredSplat& record : NextRecords(&rows, layout, std::min(kAtOnce, count - i)))
       collector.Add(record);
   SplatScene scene = std::move(collector).Finish();
   scene.format = SplatFormat::kPly;

@@ -13,9 +13,9 @@
 #include <string_view>
 #include <vector>
 
+#include "pipeline/fields/colored_splat.h"
 #include "pipeline/fields/ply_header.h"
 #include "pipeline/fields/ply_rows.h"
-#include "pipeline/fields/splat_record.h"
 
 namespace regrade {
 
@@ -33,7 +33,7 @@ inline constexpr size_t kFirstHarmonic = 11;
 GaussianLayout FindGaussians(const PlyHeader& header, const std::string& where);
 
 // The current row. Throws Error(kInput) for a word that is no number.
-SplatRecord RecordOf(const PlyRows& rows, const GaussianLayout& layout);
+ColoredSplat RecordOf(const PlyRows& rows, const GaussianLayout& layout);
 
 // The whole file. Throws Error(kInput), see ReadSplats.
 SplatScene ReadGaussianPly(std::string_view bytes, const PlyHeader& header, uint64_t budget,

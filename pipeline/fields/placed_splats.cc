@@ -5,7 +5,7 @@
 
 #include "kernels/base/error.h"
 #include "kernels/splats/splat_field.h"
-#include "pipeline/fields/splat_record.h"
+#include "pipeline/fields/colored_splat.h"
 
 namespace regrade {
 
@@ -15,7 +15,7 @@ void MoveSplats(const Similarity& target_from_source, Splats* splats) {
   const int64_t width = 3 * splats->basis;
 #pragma omp parallel for schedule(static)
   for (int64_t i = 0; i < splats->count(); ++i) {
-    SplatRecord record = SplatAt(splats->view(), i);
+    ColoredSplat record = SplatAt(splats->view(), i);
     const Vec3d mean = target_from_source * record.splat.mean.Cast<double>();
     turn.Apply(splats->basis, &record);
     record.splat.mean = mean.Cast<float>();
@@ -52,7 +52,7 @@ std::vector<float> ColorsBeforeMove(const Similarity& target_from_source,
   std::vector<float> before(sh.size());
 #pragma omp parallel for schedule(static)
   for (size_t i = 0; i < sh.size(); i += width) {
-    SplatRecord record;
+    ColoredSplat record;
     std::copy_n(sh.begin() + static_cast<long>(i), width, record.sh);
     back.Apply(basis, &record);
     std::copy_n(record.sh, width, before.begin() + static_cast<long>(i));

@@ -79,7 +79,7 @@ void WriteRestyled(const std::filesystem::path& path_in, const std::filesystem::
   size_t usable = 0;
   for (uint64_t i = 0; i < element.count; ++i) {
     rows.Next();
-    SplatRecord record = RecordOf(rows, layout);
+    ColoredSplat record = RecordOf(rows, layout);
     if (!CleanRecord(layout.basis, &record)) continue;
     if (usable++ >= splats) break;
     if (!kept.empty() && kept[usable - 1]) continue;

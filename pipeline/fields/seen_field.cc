@@ -5,12 +5,13 @@
 
 namespace regrade {
 
-StoredField ReadSeenField(const std::string& path, const std::vector<Camera>& cameras) {
+StoredField SeenPart(StoredField geometry, const std::string& path,
+                     const std::vector<Camera>& cameras) {
+  if (!geometry.field.geometry->splats.on()) return geometry;
+  geometry = {};
   return ReadPartOfField(path, [&](const RadianceField& field) {
-    std::vector<uint8_t> seen;
-    MarkSeenSplats(SplatsWithoutColors(field.geometry->splats), cameras, SplatOptionsOf(field),
-                   &seen);
-    return seen;
+    return SeenSplats(SplatsWithoutColors(field.geometry->splats), cameras,
+                      SplatOptionsOf(field));
   });
 }
 

@@ -8,9 +8,11 @@
 
 namespace regrade {
 
-// Of a field of splats those in the picture of one of the cameras, which are in the field's
-// frame: pictures of them have the same bits as those of the whole field. Memory: see
-// ReadPartOfField.
-StoredField ReadSeenField(const std::string& path, const std::vector<Camera>& cameras);
+// `geometry`: what ReadFieldGeometry read of the file `path`. Returns of splats, with their
+// colours, those in the picture of one of the cameras, which are in the field's frame: their
+// pictures have the same bits as those of the whole field. Memory: see ReadPartOfField. Voxels
+// are whole already.
+StoredField SeenPart(StoredField geometry, const std::string& path,
+                     const std::vector<Camera>& cameras);
 
 }  // namespace regrade

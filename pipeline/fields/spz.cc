@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "kernels/base/error.h"
-#include "pipeline/fields/splat_record.h"
+#include "pipeline/fields/colored_splat.h"
 #include "pipeline/files/byte_packing.h"
 #include "pipeline/files/deflate.h"
 #include "pipeline/files/zstd.h"
@@ -199,8 +199,8 @@ void UnpackRotation(const uint8_t* bytes, uint32_t version, float* quaternion) {
   for (int a = 0; a < 4; ++a) quaternion[a] = static_cast<float>(xyzw[(a + 3) % 4]);
 }
 
-SplatRecord Unpack(const Attributes& a, size_t i, int basis) {
-  SplatRecord record;
+ColoredSplat Unpack(const Attributes& a, size_t i, int basis) {
+  ColoredSplat record;
   const uint8_t *position = a.Of(kPositions, i), *color = a.Of(kColors, i),
                 *scale = a.Of(kScales, i), *harmonics = a.Of(kHarmonics, i);
   for (int axis = 0; axis < 3; ++axis, position += 3) {
@@ -232,7 +232,7 @@ SplatScene ReadSpz(std::string_view bytes, uint64_t budget, const std::string& w
   const SplatTurn turn(TurnOf(attributes, where, &ignored));
   SplatCollector collector(header.count, basis, bytes.size(), budget, where);
   for (uint32_t i = 0; i < header.count; ++i) {
-    SplatRecord record = Unpack(attributes, i, basis);
+    ColoredSplat record = Unpack(attributes, i, basis);
     turn.Apply(basis, &record);
     collector.Add(record);
   }

@@ -7,9 +7,9 @@
 
 #include "kernels/base/quantile.h"
 #include "kernels/splats/covariance.h"
+#include "pipeline/fields/colored_splat.h"
 #include "pipeline/fields/morton_order.h"
 #include "pipeline/fields/placed_splats.h"
-#include "pipeline/fields/splat_record.h"
 #include "pipeline/files/atomic_file.h"
 #include "pipeline/files/byte_packing.h"
 #include "pipeline/files/deflate.h"
@@ -119,7 +119,7 @@ void WriteSpz(const std::string& path, const Splats& splats, bool antialiased) {
   const SplatTurn turn(HalfTurnAboutX());
   std::string positions, opacities, colors, scales, rotations, harmonics;
   for (const int64_t i : MortonOrder(splats.view())) {
-    SplatRecord record = SplatAt(splats.view(), i);
+    ColoredSplat record = SplatAt(splats.view(), i);
     const Vec3d mean = record.splat.mean.Cast<double>();
     if (const double share = reach.ShareOf(mean); share < 1) {
       record.splat.mean = reach.Within(mean).Cast<float>();

@@ -233,10 +233,10 @@ void NpzReader::ReadRows(const std::string& name,
   const NpyHeader& header = member.header();
   NpzArray rows{header.type, header.shape, {}};
   const int64_t count = header.shape.empty() ? 1 : header.shape[0];
-  if (count == 0) take(0, rows);
   const int64_t each = count > 0 ? static_cast<int64_t>(header.data_bytes) / count : 0;
+  if (each == 0) take(0, rows);
   const int64_t step = std::max<int64_t>(1, kRowBytes / std::max<int64_t>(each, 1));
-  for (int64_t first = 0; first < count; first += step) {
+  for (int64_t first = 0; each > 0 && first < count; first += step) {
     const int64_t here = std::min(step, count - first);
     if (!rows.shape.empty()) rows.shape[0] = here;
     rows.bytes.Resize(here * each);

@@ -113,7 +113,7 @@ class NpzReader {
   // Its type and shape, without its values.
   NpzArray Describe(const std::string& name);
   // The same array, some rows of its first axis at a time: as many as a few megabytes hold, the
-  // array's shape but for their number. An array without rows is taken once.
+  // array's shape but for their number. An array without values is taken once, as it is.
   void ReadRows(const std::string& name,
                 const std::function<void(int64_t first, const NpzArray& rows)>& take);
   template <typename T>

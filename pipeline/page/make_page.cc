@@ -149,38 +149,12 @@ void AddStyle(const std::string& style_folder, const std::string& name,
   content->styles.push_back(std::move(style));
 }
 
-// The field, or of one with more splats than the page may have those that photos show most.
-StoredField ReadFieldOfPage(const std::string& folder, const PageOptions& options,
-                            MadePage* made) {
-  const std::string path = folder + "/field.npz";
-  if (options.most_splats == 0) return ReadFieldFile(path);
-  const StoredField all = ReadFieldGeometry(path);
-  if (!all.field.geometry->splats.on() || all.records.of <= options.most_splats)
-    return ReadFieldFile(path);
-  std::vector<Camera> photos;
-  for (const Camera& camera :
-       ReadWorkingViews(folder + "/poses", kChecked, 0).InField(all).Cameras())
-    photos.push_back(camera.Undistorted());
-  StoredField part = ReadPartOfField(path, [&](const RadianceField& field) {
-    return MostShown(field, photos, options.most_splats);
-  });
-  const PageCheck check =
-      CheckPage(ReadFieldFile(path).field, part.field, CheckedViews(photos, kChecked));
-  made->report.push_back(Concat("the page has those ", part.field.geometry->num_voxels(),
-                                " of ", all.records.of, " splats that photos show most") +
-                         Format(": to a picture of all, worst of %d views, %.1f dB (mean %.1f)",
-                                check.views, check.worst_db, check.mean_db));
-  return part;
-}
-
-}  // namespace
-
-MadePage MakePage(const std::string& folder, const std::vector<std::string>& styles,
-                  const PageOptions& options, const ProgressFunction& progress) {
+// The page of a field of `folder`, or of a part of it.
+MadePage PageOf(StoredField stored, const std::string& folder,
+                const std::vector<std::string>& styles, const PageOptions& options,
+                const ProgressFunction& progress) {
   const int steps = 2 + static_cast<int>(styles.size());
-  ReportOrThrow(progress, 0, steps);
   MadePage made;
-  StoredField stored = ReadFieldOfPage(folder, options, &made);
   const WorkingViews views = ReadWorkingViews(folder + "/poses", kChecked, 0).InField(stored);
   PageContent content;
   content.served = options.served;
@@ -204,14 +178,96 @@ MadePage MakePage(const std::string& folder, const std::vector<std::string>& sty
     if (options.names != "off") content.styles.back().header["name"] = styles[i];
   }
   ReportOrThrow(progress, steps - 1, steps);
-  if (!options.served) made.field = {}, made.places = {};
   made.html = PageHtml(content, options.check ? &check : nullptr);
+  made.bytes = std::ssize(made.html);
   made.records = content.field.header.At("voxels").AsInt();
   made.records_name = RecordsName(content.field);
   made.field_bytes = InText(content.field.bytes());
   if (content.coarse) made.coarse_bytes = InText(content.coarse->bytes());
   for (const PageStyle& style : content.styles)
     made.style_bytes.push_back(InText(style.packed.size()) + InText(style.residual.size()));
+  return made;
+}
+
+std::vector<Camera> PhotosOf(const std::string& folder, const StoredField& stored) {
+  std::vector<Camera> photos;
+  for (const Camera& camera :
+       ReadWorkingViews(folder + "/poses", kChecked, 0).InField(stored).Cameras())
+    photos.push_back(camera.Undistorted());
+  return photos;
+}
+
+// The splats of a file, first those that photos show most.
+class RankedSplats {
+ public:
+  RankedSplats(const std::string& path, const std::string& folder) : path_(path) {
+    const StoredField geometry = ReadFieldGeometry(path);
+    photos_ = PhotosOf(folder, geometry);
+    order_ = ByWhatIsShown(geometry.field, photos_);
+  }
+
+  StoredField Read(int64_t most) const {
+    return ReadPartOfField(path_, [&](const RadianceField&) {
+      std::vector<uint8_t> kept(order_.size());
+      for (int64_t i = 0; i < most; ++i)
+        kept[static_cast<size_t>(order_[static_cast<size_t>(i)])] = 1;
+      return kept;
+    });
+  }
+
+  std::string Line(const MadePage& page) const {
+    const PageCheck check =
+        CheckPage(ReadFieldFile(path_).field, page.field, CheckedViews(photos_, kChecked));
+    return Concat("the page has those ", page.records, " of ", order_.size(),
+                  " splats that photos show most: ") +
+           CheckLine("its pictures", check);
+  }
+
+ private:
+  std::string path_;
+  std::vector<Camera> photos_;
+  std::vector<int64_t> order_;
+};
+
+// How many splats the page may have, after one of `made` that has too many bytes.
+int64_t FewerSplats(const MadePage& made, int64_t most_bytes) {
+  const int64_t left = most_bytes - (made.bytes - made.field_bytes);
+  return std::max(int64_t{1}, made.records * left / made.field_bytes * 99 / 100);
+}
+
+MadePage PageWithin(const std::string& folder, const std::vector<std::string>& styles,
+                    const PageOptions& options, const ProgressFunction& progress) {
+  constexpr int kTries = 4;                 // the fewer splats, the more bytes each
+  constexpr int64_t kLeastSplatBytes = 12;  // saves a try that cannot do
+  const std::string path = folder + "/field.npz";
+  const int64_t count = CountSplats(path);
+  int64_t most = count > 0 ? options.most_bytes / kLeastSplatBytes : 1;
+  std::optional<RankedSplats> ranked;
+  for (int i = 1;; ++i) {
+    const bool all = count <= most;
+    if (!all && !ranked) ranked.emplace(path, folder);
+    MadePage made = PageOf(all ? ReadFieldFile(path) : ranked->Read(most), folder, styles,
+                           options, progress);
+    const bool fits = made.bytes <= options.most_bytes;
+    if (fits && !all) made.report.push_back(ranked->Line(made));
+    if (fits) return made;
+    if (count == 0 || i == kTries) {
+      made.html.clear();
+      return made;
+    }
+    most = FewerSplats(made, options.most_bytes);
+  }
+}
+
+}  // namespace
+
+MadePage MakePage(const std::string& folder, const std::vector<std::string>& styles,
+                  const PageOptions& options, const ProgressFunction& progress) {
+  ReportOrThrow(progress, 0, 1);
+  MadePage made = options.most_bytes > 0 ? PageWithin(folder, styles, options, progress)
+                                         : PageOf(ReadFieldFile(folder + "/field.npz"), folder,
+                                                  styles, options, progress);
+  if (!options.served) made.field = {}, made.places = {};
   return made;
 }
 

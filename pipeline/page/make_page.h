@@ -16,8 +16,8 @@ struct PageOptions {
   double step = 0.03;
   bool check = false;
   std::string names = "on";
-  bool served = false;      // by `regrade view`
-  int64_t most_splats = 0;  // see MostShown; 0 takes all
+  bool served = false;     // by `regrade view`
+  int64_t most_bytes = 0;  // of the page; 0 has no limit
 
   template <typename Bind>
   void Describe(Bind& bind) {
@@ -38,7 +38,8 @@ struct PageOptions {
 };
 
 struct MadePage {
-  std::string html;
+  std::string html;                      // empty where the page would have more than most_bytes
+  int64_t bytes = 0;                     // that it would have
   int64_t records = 0, field_bytes = 0;  // in the text of the page
   const char* records_name = "";         // see RecordsName
   int64_t coarse_bytes = 0;              // of what is shown first
@@ -48,7 +49,9 @@ struct MadePage {
   PageVoxels places;                // its records, as the page orders them
 };
 
-// `styles`: names in `folder`; with what they add voxel by voxel. Throws Error(kInput).
+// `styles`: names in `folder`; with what they add voxel by voxel. Where most_bytes do not hold
+// all splats, the page has those that photos show most, see ByWhatIsShown, and the report says
+// how far its pictures are from the exact ones. Throws Error(kInput).
 MadePage MakePage(const std::string& folder, const std::vector<std::string>& styles,
                   const PageOptions& options, const ProgressFunction& progress);
 

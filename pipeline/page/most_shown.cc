@@ -1,6 +1,7 @@
 #include "pipeline/page/most_shown.h"
 
 #include <algorithm>
+#include <functional>
 #include <numeric>
 
 #include "kernels/render/ray_weigher.h"
@@ -23,24 +24,17 @@ void AddShown(const Camera& camera, RayWeigher* weigher, std::vector<double>* sh
 
 }  // namespace
 
-std::vector<uint8_t> MostShown(const RadianceField& field, const std::vector<Camera>& cameras,
-                               int64_t most) {
-  const int64_t count = field.geometry->num_voxels();
-  std::vector<double> shown(static_cast<size_t>(count));
+std::vector<int64_t> ByWhatIsShown(const RadianceField& field,
+                                   const std::vector<Camera>& cameras) {
+  std::vector<double> shown(static_cast<size_t>(field.geometry->num_voxels()));
   const auto weigher =
       MakeRayWeigher(*field.geometry, field.near_clip, field.march, kLeastWeight);
   for (const Camera& camera : cameras) AddShown(camera, weigher.get(), &shown);
   std::vector<int64_t> order(shown.size());
   std::iota(order.begin(), order.end(), 0);
-  most = std::min(most, count);
-  std::ranges::nth_element(order, order.begin() + most, [&](int64_t a, int64_t b) {
-    const double of_a = shown[static_cast<size_t>(a)], of_b = shown[static_cast<size_t>(b)];
-    return of_a != of_b ? of_a > of_b : a < b;
-  });
-  std::vector<uint8_t> marked(shown.size());
-  for (int64_t i = 0; i < most; ++i)
-    marked[static_cast<size_t>(order[static_cast<size_t>(i)])] = 1;
-  return marked;
+  std::ranges::stable_sort(order, std::greater(),
+                           [&](int64_t i) { return shown[static_cast<size_t>(i)]; });
+  return order;
 }
 
 }  // namespace regrade

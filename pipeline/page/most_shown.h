@@ -9,10 +9,10 @@
 
 namespace regrade {
 
-// Marks `most` splats [splats]: those with the largest sums, over all pixels of the cameras, of
-// w_i of EQ(splat-composite); of equal ones the first. Pinholes, in the field's frame. The same
-// for any number of threads. Colours are not looked at.
-std::vector<uint8_t> MostShown(const RadianceField& field, const std::vector<Camera>& cameras,
-                               int64_t most);
+// Indices of all splats, first those with the largest sums, over all pixels of the cameras, of
+// w_i of EQ(splat-composite), without those up to 1 / 1024; of equal ones the first. Pinholes,
+// in the field's frame. The same for any number of threads. Colours are not looked at.
+std::vector<int64_t> ByWhatIsShown(const RadianceField& field,
+                                   const std::vector<Camera>& cameras);
 
 }  // namespace regrade

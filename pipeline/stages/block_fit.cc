@@ -55,7 +55,7 @@ BlockInput ReadInput(const WorkingViews& views, const StoredField& around,
     input.photos.Add({camera, &photo, points[v]});
     cameras.push_back(camera.Undistorted());
   }
-  MarkSeenSplats(splats, cameras, options, &input.seen);
+  input.seen = SeenSplats(splats, cameras, options);
   if (input.photos.count() == 0)
     throw SceneError("the masks leave nothing of the photos that see a block", "",
                      "give fewer --blocks");
@@ -125,6 +125,8 @@ void FitBlock(const RunContext& context, const WorkingViews& views, const Stored
   options.thousands *= static_cast<float>(space.share);
   options.seed = settings.run.seed + static_cast<uint64_t>(block);
   if (space.repeats >= 0) options.begin = kLastTurnBegin;
+  // Few photos are the whole field's, so that blocks are alike where they meet.
+  if (std::ssize(views.Training()) >= options.few_photos) options.few_photos = 0;
   // The process has the field twice besides: each is a sixth of what a fit has of a splat.
   const int64_t copies = backend == Backend::kCpu ? splats.count / 3 : 0;
   const FitPlace place{.backend = backend,

@@ -105,12 +105,12 @@ void WritePathFilm(const std::string& folder, const KeyframePath& path, const Pa
   }
   CheckResults(folder, names);
   const std::string field = folder + "/field.npz";
-  const NdcSpace ndc = ReadFieldGeometry(field).ndc;
+  StoredField geometry = ReadFieldGeometry(field);
   std::vector<Camera> cameras;
   for (int i = 0; i < film.frames; ++i)
     cameras.push_back(CameraOfKeyframe(path.At(path.Seconds() * i / (film.frames - 1)),
-                                       film.width, film.height, ndc));
-  StoredField source = ReadSeenField(field, cameras);
+                                       film.width, film.height, geometry.ndc));
+  StoredField source = SeenPart(std::move(geometry), field, cameras);
   std::vector<StoredField> styles;
   for (const std::string& name : names)
     styles.push_back(StyledFieldOf(source, StyleFolder(folder, name), 1));

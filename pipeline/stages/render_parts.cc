@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <iterator>
 #include <memory>
 #include <optional>
 #include <set>
@@ -118,7 +119,8 @@ void RenderPart(const Stage& stage, RunContext* context) {
   Console* const console = context->console;
   const std::string title = "part " + context->parts.part + " of the frames and films";
   const std::string field = context->workspace->Path("field.npz");
-  const FramePlan plan = PlanFrames(*context, ReadFieldGeometry(field));
+  StoredField geometry = ReadFieldGeometry(field);
+  const FramePlan plan = PlanFrames(*context, geometry);
   const SharedWork work = PartsOf(*context, stage.inputs);
   const std::string& folder = work.path();
   std::vector<FrameUnit> units = UnitsOfPart(UnitsOf(plan.sets), context->parts.part);
@@ -129,7 +131,12 @@ void RenderPart(const Stage& stage, RunContext* context) {
   work.Begin();
   console->Info(title + ": " + TextOf(units));
   console->BeginStage("render", title);
-  SceneFrames frames(context, plan, ReadSeenField(field, CamerasOf(units)), [](StoredField) {});
+  std::vector<Camera> cameras = CamerasOf(units);
+  // Photos with layers say where their edits are, see CarriedEdit.
+  if (context->settings.residual.On())
+    std::ranges::copy(plan.views.Cameras(), std::back_inserter(cameras));
+  SceneFrames frames(context, plan, SeenPart(std::move(geometry), field, cameras),
+                     [](StoredField) {});
   const SeenByFewRecorder seen(plan.views, plan.near);
   const auto tick = TickOf(units, console->StageProgress());
   for (const FrameUnit& unit : units)

@@ -105,10 +105,9 @@ ReportPictures PicturesOf(const RunContext& context, const RunReport& report) {
   return pictures;
 }
 
-// scene.html beside the report; false where it is not wanted or, of voxels, too large.
+// scene.html beside the report; false where it is not wanted or too large.
 bool WriteScenePage(const RunContext& context, const ProgressFunction& progress) {
   constexpr int64_t kLargest = 25'000'000;  // bytes, of --page auto
-  constexpr int kFewerSplats = 3;           // times
   const std::string& choice = context.settings.page.page;
   const Workspace& style = *context.style;
   const std::string path = style.Path(kScenePage);
@@ -116,24 +115,11 @@ bool WriteScenePage(const RunContext& context, const ProgressFunction& progress)
   if (choice == "off") return false;
   const std::string name = std::filesystem::path(style.folder()).filename().string();
   PageOptions options{.names = "styles"};
-  if (choice == "auto") options.most_splats = kLargest / 12;
-  const auto make = [&] {
-    return MakePage(context.workspace->folder(), {name}, options, progress);
-  };
-  const auto is_too_large = [&](const MadePage& made) {
-    return choice == "auto" && std::ssize(made.html) > kLargest;
-  };
-  MadePage made = make();
-  // The fewer splats, the more bytes each.
-  for (int i = 0; i < kFewerSplats && is_too_large(made); ++i) {
-    const int64_t of_splats = made.field_bytes + made.style_bytes[0],
-                  left = kLargest - (std::ssize(made.html) - of_splats);
-    options.most_splats = std::max(int64_t{1}, made.records * left / of_splats * 99 / 100);
-    made = make();
-  }
-  if (is_too_large(made)) {
+  if (choice == "auto") options.most_bytes = kLargest;
+  const MadePage made = MakePage(context.workspace->folder(), {name}, options, progress);
+  if (made.html.empty()) {
     context.console->Info(Format("no page: it would have %.0f MB; --page on writes it",
-                                 static_cast<double>(made.html.size()) / 1e6));
+                                 static_cast<double>(made.bytes) / 1e6));
     return false;
   }
   for (const std::string& line : made.report) context.console->Info(line);

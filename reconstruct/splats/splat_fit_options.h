@@ -41,7 +41,7 @@ struct SplatFitOptions {
   // than that of means fall to `fall` of what they were, so that what this stirs settles.
   int long_from = 4000;
   float dropout = 0.1f, fall = 0.1f;
-  // Long fits of fewer photos have both weights so many times.
+  // Long fits of fewer photos multiply both weights by this.
   int few_photos = 16;
   float few_photos_weights = 2;
   float begin = 0;  // part of all steps that a refinement leaves out
@@ -63,12 +63,14 @@ struct SplatFitOptions {
           .constant = true});
     bind("splat-opacity-weight", opacity_weight,
          {.help = "weight of the mean opacity in the loss: larger values leave fewer "
-                  "half-transparent splats",
+                  "half-transparent splats; it counts twice in fits of 4000 steps and more of "
+                  "fewer than 16 photos",
           .min = 0,
           .max = 10,
           .constant = true});
     bind("splat-scale-weight", scale_weight,
-         {.help = "weight of the mean scale in the loss: larger values leave smaller splats",
+         {.help = "weight of the mean scale in the loss, as that of the opacity: larger values "
+                  "leave smaller splats",
           .min = 0,
           .max = 10,
           .constant = true});

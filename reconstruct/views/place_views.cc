@@ -72,7 +72,7 @@ struct Candidate {
 
 class Placement {
  public:
-  Placement(const FieldRenderer& renderer, Stage stage, std::vector<SplatSample> samples)
+  Placement(const FieldRenderer& renderer, Stage stage, std::vector<SampledSplat> samples)
       : renderer_(renderer), stage_(std::move(stage)), samples_(std::move(samples)) {}
 
   // Two rings on which an object as large as this scene fits into its pictures.
@@ -206,7 +206,7 @@ class Placement {
     Vec3d middle;
     for (const Vec3d& axis : {stage_.up, stage_.east, stage_.north}) {
       std::vector<double> along;
-      for (const SplatSample& sample : samples_) along.push_back(Dot(axis, sample.mean));
+      for (const SampledSplat& sample : samples_) along.push_back(Dot(axis, sample.mean));
       middle = middle + axis * (0.5 * (Quantile(along, 0.01) + Quantile(along, 0.99)));
     }
     return middle;
@@ -217,7 +217,7 @@ class Placement {
     const Camera camera = LookAt(middle, -way, stage_.up, 1000, portrait);
     const double wide = 0.5 * camera.width / camera.fx, high = 0.5 * camera.height / camera.fy;
     std::vector<double> needed;
-    for (const SplatSample& sample : samples_) {
+    for (const SampledSplat& sample : samples_) {
       const Vec3d p = camera.camera_from_world * sample.mean;
       needed.push_back(std::max(std::abs(p.x) / wide, std::abs(p.y) / high) - p.z);
     }
@@ -226,7 +226,7 @@ class Placement {
 
   const FieldRenderer& renderer_;
   Stage stage_;
-  std::vector<SplatSample> samples_;
+  std::vector<SampledSplat> samples_;
 };
 
 // The part of the samples that the candidates show together, each as well as the best of them.

@@ -17,7 +17,7 @@ constexpr double kSameDepth = 0.06;             // likewise, of a splat that is 
 constexpr double kFinest = 0.4, kCoarsest = 4;  // pixels of a picture of kWidth
 constexpr double kWidth = 480;
 
-float SeenAt(const Camera& camera, const Image& depths, const SplatSample& sample) {
+float SeenAt(const Camera& camera, const Image& depths, const SampledSplat& sample) {
   double u = 0, v = 0, depth = 0;
   if (!camera.Project(sample.mean, &u, &v, &depth)) return 0;
   if (!(u >= 0 && v >= 0 && u < camera.width && v < camera.height)) return 0;
@@ -35,9 +35,9 @@ double ViewProbe::Quality() const {
   return std::pow(opaque / shown, 2) * std::max(0.0, 1 - 1.5 * rough);
 }
 
-std::vector<SplatSample> SampleSplats(const Splats& splats, int64_t most) {
+std::vector<SampledSplat> SampleSplats(const Splats& splats, int64_t most) {
   const SplatsView<float> view = splats.view();
-  std::vector<SplatSample> samples;
+  std::vector<SampledSplat> samples;
   for (const int64_t i : OpaqueSplats(view, most)) {
     const Splat<float> splat = view[i];
     samples.push_back({splat.mean.Cast<double>(), SizeOf(splat)});
@@ -62,7 +62,7 @@ RadianceField FieldForProbes(const Splats& splats, const RadianceField& field, i
 }
 
 ViewProbe ProbeView(const FieldRenderer& renderer, const Camera& camera,
-                    const std::vector<SplatSample>& samples) {
+                    const std::vector<SampledSplat>& samples) {
   const RenderedView view = renderer.Render(camera);
   ViewProbe probe;
   std::vector<double> depths;
@@ -92,7 +92,7 @@ ViewProbe ProbeView(const FieldRenderer& renderer, const Camera& camera,
       static_cast<double>(border_empty) / static_cast<double>(std::max<int64_t>(1, border));
   probe.rough = pairs > 0 ? static_cast<double>(jumps) / static_cast<double>(pairs) : 1;
   probe.nearest = Quantile(depths, 0.02);
-  for (const SplatSample& sample : samples)
+  for (const SampledSplat& sample : samples)
     probe.seen.push_back(SeenAt(camera, view.depth, sample));
   return probe;
 }

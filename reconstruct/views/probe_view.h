@@ -26,11 +26,11 @@ struct ViewProbe {
 };
 
 // Splats that stand for all: at most `most` opaque ones.
-struct SplatSample {
+struct SampledSplat {
   Vec3d mean;
   double size;  // middle one of the standard deviations, world units
 };
-std::vector<SplatSample> SampleSplats(const Splats& splats, int64_t most);
+std::vector<SampledSplat> SampleSplats(const Splats& splats, int64_t most);
 
 // What probes see of `field`, which is made of `splats`: no colours, and of more than `most`
 // splats one of each few, which covers as much as they do.
@@ -39,6 +39,6 @@ RadianceField FieldForProbes(const Splats& splats, const RadianceField& field, i
 // A splat is seen best where it is 0.4 to 4 pixels large in a picture of 480 pixels: photos
 // show no more from farther away, and had no more to show from nearer.
 ViewProbe ProbeView(const FieldRenderer& renderer, const Camera& camera,
-                    const std::vector<SplatSample>& samples);
+                    const std::vector<SampledSplat>& samples);
 
 }  // namespace regrade

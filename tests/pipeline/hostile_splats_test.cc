@@ -6,8 +6,8 @@
 #include <limits>
 
 #include "kernels/splats/covariance.h"
+#include "pipeline/fields/colored_splat.h"
 #include "pipeline/fields/read_splats.h"
-#include "pipeline/fields/splat_record.h"
 #include "tests/support/expect_error.h"
 #include "tests/support/peak_memory.h"
 #include "tests/support/small_splats.h"

@@ -118,9 +118,14 @@ TEST(Npz, FilledRowsAreTheArray) {
     });
     EXPECT_EQ(read, kRows);
     EXPECT_GT(times, 2);
-    reader.ReadRows("none", [](int64_t, const NpzArray& rows) {
+    int taken = 0;
+    reader.ReadRows("none", [&](int64_t, const NpzArray& rows) {
+      ++taken;
       EXPECT_EQ(rows.shape, (std::vector<int64_t>{0, 4}));
     });
+    EXPECT_EQ(taken, 1);
+    NpzReader small(folder / "plain.npz", 1 << 20);
+    EXPECT_THROW(small.ReadRows("a", [](int64_t, const NpzArray&) { FAIL(); }), Error);
   }
 }
 

@@ -137,22 +137,6 @@ TEST(SplatCodec, FirstComeThoseThatContributeMost) {
 }
 
 // What a style adds splat by splat needs the same order from both fields.
-TEST(MostShown, WhatNoCameraSeesGoesFirst) {
-  const RadianceField field = FieldOf(300, 1);
-  Camera camera = testing::SplatCameraOf(40, 30);
-  camera.fx *= 6, camera.fy *= 6;
-  std::vector<uint8_t> seen;
-  MarkSeenSplats(SplatsOf(field), {camera}, SplatOptionsOf(field), &seen);
-  const auto count = std::ranges::count(seen, 1);
-  ASSERT_GT(count, 20);
-  ASSERT_LT(count, 290);
-  for (const int64_t most : {int64_t{5}, int64_t{count} / 2, int64_t{300}, int64_t{1000}}) {
-    const std::vector<uint8_t> marked = MostShown(field, {camera}, most);
-    EXPECT_EQ(std::ranges::count(marked, 1), std::min<int64_t>(most, 300));
-    for (size_t i = 0; i < seen.size() && most < count; ++i) EXPECT_LE(marked[i], seen[i]);
-  }
-}
-
 TEST(SplatCodec, OrderIsThatOfTheDecodedField) {
   const RadianceField field = FieldOf(500, 4);
   const PageField page = EncodeField(field, kSplatPageStep);
@@ -167,6 +151,37 @@ TEST(SplatCodec, OrderIsThatOfTheDecodedField) {
     for (int a = 0; a < 3; ++a)
       EXPECT_NEAR(decoded.geometry->splats.mean[3 * i + a],
                   field.geometry->splats.mean[3 * of.voxel[static_cast<size_t>(i)] + a], 1e-3);
+}
+
+TEST(ByWhatIsShown, FirstComesWhatPicturesNeed) {
+  const RadianceField field = FieldOf(300, 1);
+  Camera camera = testing::SplatCameraOf(40, 30);
+  camera.fx *= 6, camera.fy *= 6;
+  const std::vector<uint8_t> seen =
+      SeenSplats(SplatsOf(field), {camera}, SplatOptionsOf(field));
+  const auto count = std::ranges::count(seen, 1);
+  ASSERT_GT(count, 20);
+  ASSERT_LT(count, 290);
+  std::vector<int64_t> order = ByWhatIsShown(field, {camera});
+  for (int64_t i = 0; i < count / 2; ++i)
+    EXPECT_EQ(seen[static_cast<size_t>(order[static_cast<size_t>(i)])], 1);
+  const FieldRenderer whole(field, Backend::kCpu);
+  const auto error = [&](int64_t first, int64_t last) {
+    Splats part(0, 1);
+    part.background = field.background;
+    std::vector<uint8_t> in(300);
+    for (int64_t i = first; i < last; ++i)
+      in[static_cast<size_t>(order[static_cast<size_t>(i)])] = 1;
+    AppendSplats(
+        SplatsOf(field), [&](int64_t i) { return in[static_cast<size_t>(i)] != 0; }, &part);
+    const RadianceField of_part =
+        FieldOfSplats(part, field.geometry->frame, field.near_clip, -1);
+    return -DecibelsBetween(FieldRenderer(of_part, Backend::kCpu).Render(camera).color,
+                            whole.Render(camera).color);
+  };
+  EXPECT_LT(error(0, count / 2), error(count / 2, count));
+  std::ranges::sort(order);
+  for (int64_t i = 0; i < 300; ++i) EXPECT_EQ(order[static_cast<size_t>(i)], i);
 }
 
 TEST(SplatCodec, DamagedSectionsAreRefused) {

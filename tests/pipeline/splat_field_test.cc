@@ -109,7 +109,8 @@ TEST(SplatField, CamerasReadWhatTheySee) {
   Camera aside = narrow;
   aside.cx = -60;
   for (const std::vector<Camera>& cameras : {std::vector{narrow}, std::vector{narrow, aside}}) {
-    const StoredField seen = ReadSeenField(folder / "field.npz", cameras);
+    const StoredField seen =
+        SeenPart(ReadFieldGeometry(folder / "field.npz"), folder / "field.npz", cameras);
     const KeptRecords& records = seen.records;
     ASSERT_EQ(records.of, 300);
     ASSERT_FALSE(records.all);
@@ -125,7 +126,7 @@ TEST(SplatField, CamerasReadWhatTheySee) {
   }
   Camera away = narrow;
   away.cx = 1e6;
-  EXPECT_EQ(ReadSeenField(folder / "field.npz", {away}).records.kept.size(), 1u);
+  EXPECT_EQ(SeenPart({whole}, folder / "field.npz", {away}).records.kept.size(), 1u);
 
   const StoredField shapes = ReadFieldGeometry(folder / "field.npz");
   EXPECT_TRUE(Same(shapes.field.geometry->splats.mean, whole.field.geometry->splats.mean));

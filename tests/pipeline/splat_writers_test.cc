@@ -6,10 +6,10 @@
 #include <filesystem>
 
 #include "kernels/splats/covariance.h"
+#include "pipeline/fields/colored_splat.h"
 #include "pipeline/fields/compressed_ply_writer.h"
 #include "pipeline/fields/morton_order.h"
 #include "pipeline/fields/read_splats.h"
-#include "pipeline/fields/splat_record.h"
 #include "pipeline/fields/spz_writer.h"
 #include "pipeline/files/deflate.h"
 #include "tests/support/data.h"
@@ -35,7 +35,7 @@ struct Bounds {
 
 double OpacityOf(float logit) { return 1 / (1 + std::exp(-double{logit})); }
 
-void ExpectSplatNear(const SplatRecord& a, const SplatRecord& b, int basis,
+void ExpectSplatNear(const ColoredSplat& a, const ColoredSplat& b, int basis,
                      const Bounds& bounds) {
   for (int axis = 0; axis < 3; ++axis) {
     EXPECT_NEAR(a.splat.mean[axis], b.splat.mean[axis], bounds.mean);
@@ -114,7 +114,7 @@ TEST(WriteSpz, ASplatFarOutsideLeavesTheOthersAsFine) {
   ASSERT_EQ(scene.splats.count(), splats.count());
   const std::vector<int64_t> order = MortonOrder(splats.view());
   for (int64_t i = 0; i < splats.count(); ++i) {
-    const SplatRecord back = SplatAt(scene.splats.view(), i);
+    const ColoredSplat back = SplatAt(scene.splats.view(), i);
     const int64_t of = order[static_cast<size_t>(i)];
     if (of != 0) {
       EXPECT_LT(Norm(back.splat.mean - SplatAt(near.view(), of).splat.mean), 2e-5f);
@@ -154,7 +154,7 @@ TEST(WriteSpz, WhatIsBeyondTheFormatIsLimited) {
   WriteSpz(folder / "a.spz", splats, false);
   const SplatScene scene = ReadSplats(folder / "a.spz");
   const int64_t first = scene.splats.view()[0].mean.x > 0 ? 0 : 1;
-  const SplatRecord back = SplatAt(scene.splats.view(), first);
+  const ColoredSplat back = SplatAt(scene.splats.view(), first);
   EXPECT_EQ(back.splat.mean.x, 3e5f);
   EXPECT_EQ(back.splat.log_scale.x, -10);
   EXPECT_EQ(back.splat.log_scale.y, 255 / 16.0f - 10);
@@ -195,7 +195,7 @@ TEST(WriteCompressedPly, OneSplatAndALimit) {
   splats.log_scale = {-40, 1, 2};
   splats.sh[1] = 9, splats.sh[2] = -9;
   WriteCompressedPly(folder / "a.ply", splats, false, "");
-  const SplatRecord back = SplatAt(ReadSplats(folder / "a.ply").splats.view(), 0);
+  const ColoredSplat back = SplatAt(ReadSplats(folder / "a.ply").splats.view(), 0);
   EXPECT_EQ(back.splat.mean, splats.view()[0].mean);
   EXPECT_EQ(back.splat.log_scale, (Vec3f{-20, 1, 2}));
   EXPECT_EQ(back.sh[1], 4);

@@ -5,8 +5,9 @@
 
 namespace regrade {
 
-void MarkSeenSplats(const SplatsView<float>& splats, const std::vector<Camera>& cameras,
-                    const SplatOptions& options, std::vector<uint8_t>* seen) {
+std::vector<uint8_t> SeenSplats(const SplatsView<float>& splats,
+                                const std::vector<Camera>& cameras,
+                                const SplatOptions& options) {
   std::vector<SplatCamera> views;
   for (Camera camera : cameras) {
     REGRADE_CHECK(camera.lens == LensModel::kPinhole);
@@ -15,16 +16,17 @@ void MarkSeenSplats(const SplatsView<float>& splats, const std::vector<Camera>& 
   }
   SplatsView<float> shapes = splats;
   shapes.basis = 0;
-  seen->resize(static_cast<size_t>(splats.count));
+  std::vector<uint8_t> seen(static_cast<size_t>(splats.count));
 #pragma omp parallel for schedule(dynamic, 4096)
   for (int64_t i = 0; i < splats.count; ++i) {
-    uint8_t& found = (*seen)[static_cast<size_t>(i)];
+    uint8_t& found = seen[static_cast<size_t>(i)];
     SeenSplat<float> as_seen;
     for (size_t v = 0; v < views.size() && found == 0; ++v)
       if (SeeSplat(views[v], options, shapes, i, &as_seen) &&
           !ExtentOf(views[v], as_seen.ellipse, as_seen.reach).empty())
         found = 1;
   }
+  return seen;
 }
 
 }  // namespace regrade

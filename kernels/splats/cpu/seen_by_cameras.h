@@ -10,9 +10,10 @@
 
 namespace regrade {
 
-// Marks in `seen` [splats] those that are in the picture of one of the cameras, pinholes: a
+// [splats]: 1 for those in the picture of at least one of the cameras, which are pinholes. A
 // picture of these splats alone has the same bits. Colours are not looked at.
-void MarkSeenSplats(const SplatsView<float>& splats, const std::vector<Camera>& cameras,
-                    const SplatOptions& options, std::vector<uint8_t>* seen);
+std::vector<uint8_t> SeenSplats(const SplatsView<float>& splats,
+                                const std::vector<Camera>& cameras,
+                                const SplatOptions& options);
 
 }  // namespace regrade

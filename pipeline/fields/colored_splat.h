@@ -13,12 +13,12 @@
 
 namespace regrade {
 
-struct SplatRecord {
+struct ColoredSplat {
   Splat<float> splat;
   float sh[3 * kMaxBasis]{};  // [3, basis]: all coefficients of red first
 };
 
-SplatRecord SplatAt(const SplatsView<float>& splats, int64_t i);
+ColoredSplat SplatAt(const SplatsView<float>& splats, int64_t i);
 
 // A logit beyond this is as good as this: sigmoid(-kMostLogit) is 2e-9.
 inline constexpr float kMostLogit = 20;
@@ -30,14 +30,14 @@ float LogitOfByte(int byte);
 // Limits an opacity's logit to kMostLogit and the logarithm of a standard deviation to at least
 // -kMaxLogScale, both of which may be infinite (an opacity of 1, a disc), and makes a
 // quaternion without a direction that of the identity. Returns whether the record can be drawn.
-bool CleanRecord(int basis, SplatRecord* record);
+bool CleanRecord(int basis, ColoredSplat* record);
 
 // The frame of a file, turned to another one.
 class SplatTurn {
  public:
   // `to_from_file` is orthogonal; a reflection, too: Gaussians are symmetric.
   explicit SplatTurn(const Mat3d& to_from_file);
-  void Apply(int basis, SplatRecord* record) const;
+  void Apply(int basis, ColoredSplat* record) const;
 
  private:
   Mat3d matrix_;
@@ -58,7 +58,7 @@ class SplatCollector {
                  std::string where);
 
   int basis() const { return scene_.splats.basis; }
-  void Add(SplatRecord record);
+  void Add(ColoredSplat record);
   // Throws Error(kInput) if no record can be drawn.
   SplatScene Finish() &&;
 

@@ -1,4 +1,4 @@
-#include "pipeline/fields/splat_record.h"
+#include "pipeline/fields/colored_splat.h"
 
 #include <algorithm>
 #include <cmath>
@@ -10,8 +10,8 @@
 
 namespace regrade {
 
-SplatRecord SplatAt(const SplatsView<float>& splats, int64_t i) {
-  SplatRecord record{splats[i], {}};
+ColoredSplat SplatAt(const SplatsView<float>& splats, int64_t i) {
+  ColoredSplat record{splats[i], {}};
   std::copy_n(splats.Coefficients(i), 3 * splats.basis, record.sh);
   return record;
 }
@@ -21,7 +21,7 @@ float LogitOfByte(int byte) {
   return static_cast<float>(std::log(opacity / (1 - opacity)));
 }
 
-bool CleanRecord(int basis, SplatRecord* record) {
+bool CleanRecord(int basis, ColoredSplat* record) {
   Splat<float>& splat = record->splat;
   if (std::abs(splat.opacity_logit) > kMostLogit)
     splat.opacity_logit = std::copysign(kMostLogit, splat.opacity_logit);
@@ -57,7 +57,7 @@ SplatTurn::SplatTurn(const Mat3d& to_from_file)
   quaternion_ = QuaternionOf(rotation);
 }
 
-void SplatTurn::Apply(int basis, SplatRecord* record) const {
+void SplatTurn::Apply(int basis, ColoredSplat* record) const {
   Splat<float>& splat = record->splat;
   splat.mean = (matrix_ * splat.mean.Cast<double>()).Cast<float>();
   const std::array<double, 4> turned = QuaternionProduct(
@@ -99,7 +99,7 @@ SplatCollector::SplatCollector(uint64_t records, int basis, uint64_t file_bytes,
   splats.sh.reserve(3 * static_cast<size_t>(basis) * records);
 }
 
-void SplatCollector::Add(SplatRecord record) {
+void SplatCollector::Add(ColoredSplat record) {
   const int64_t index = scene_.records++;
   if (!CleanRecord(basis(), &record)) {
     if (scene_.dropped++ == 0) scene_.first_dropped = index;
