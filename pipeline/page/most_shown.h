@@ -10,8 +10,9 @@
 namespace regrade {
 
 // Indices of all splats, first those with the largest sums, over all pixels of the cameras, of
-// w_i of EQ(splat-composite), without those up to 1 / 1024; of equal ones the first. Pinholes,
-// in the field's frame. The same for any number of threads. Colours are not looked at.
+// w_i, see EQ(splat-composite), without those up to 1 / 1024; of equal ones the first.
+// Pinholes, in the field's frame. The same for any number of threads. Colours are not looked
+// at.
 std::vector<int64_t> ByWhatIsShown(const RadianceField& field,
                                    const std::vector<Camera>& cameras);
 

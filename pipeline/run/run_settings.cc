@@ -21,6 +21,7 @@ void RunSettings::Bind(OptionSet* options) {
   options->Add("Scene", &splat_input);
   options->Add("Fit", &fit);
   options->Add("Fit", &splats);
+  options->Add("Fit", &depth);
   options->Add("Style", &style);
   options->Add("2D method", &style_2d);
   options->Add("Object", &object);
@@ -122,6 +123,9 @@ void CheckTogether(const RunSettings& settings) {
                        "leave it out, or give a side for each stage");
   CheckPaper(settings.run.preset, settings.run.paper_config);
   FitKindOf(settings).check(settings);
+  if (!settings.depth.network.empty() && settings.scene.Kind().lattice)
+    throw UsageError("voxels are fitted without depths", "--depth-network",
+                     "leave it out, or give --field splats");
   const StyleMethod method = ParseStyleMethod(settings.style_2d);
   CheckResidual(settings, method.kind);
   CheckMatch(settings);

@@ -12,6 +12,7 @@
 #include "pipeline/program/option_binding.h"
 #include "pipeline/program/run_options.h"
 #include "pipeline/report/requirements.h"
+#include "pipeline/run/depth_choice.h"
 #include "pipeline/run/match_choice.h"
 #include "pipeline/run/residual_choice.h"
 #include "reconstruct/colmap/poses_from_photos.h"
@@ -168,6 +169,7 @@ struct RunSettings {
   SplatInput splat_input;
   FitOptions fit;
   SplatFitOptions splats;
+  DepthChoice depth;
   StyleSource style;
   StyleOptions style_2d;
   MaskOptions object;

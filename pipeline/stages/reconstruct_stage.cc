@@ -5,6 +5,7 @@
 
 #include "kernels/base/error.h"
 #include "pipeline/capture/capture_store.h"
+#include "pipeline/capture/guessed_depths.h"
 #include "pipeline/capture/measured_depths.h"
 #include "pipeline/capture/scene_profile.h"
 #include "pipeline/capture/working_views.h"
@@ -30,7 +31,8 @@ namespace {
 
 constexpr double kAfterFit =
     0.08;  // pruning, writing and measuring, as a fraction of the steps' time
-constexpr double kTrial = 0.08;  // the trial of degrees, likewise
+constexpr double kTrial = 0.08;    // the trial of degrees, likewise
+constexpr double kGuesses = 0.08;  // a network's depths of the photos
 
 // Measured; reads the photos' transparency.
 PaperTraits TraitsOf(const Capture& capture) {
@@ -139,6 +141,11 @@ StageOutcome Reconstruct(RunContext* context, const JsonValue& inputs,
   std::vector<std::string> depth_notes;
   std::vector<std::vector<SeenPoint>> seen =
       PointsOfViews(capture, training, scene.field_from_world, &depth_notes);
+  const std::string& depth_network = settings.depth.network;
+  ProgressParts parts(progress,
+                      (depth_network.empty() ? 0 : kGuesses) + kTrial + 1 + kAfterFit);
+  if (!depth_network.empty())
+    AddGuessedDepths(depth_network, views, training, parts.Next(kGuesses), &seen, &depth_notes);
   for (const std::string& note : depth_notes) context->console->Info(note);
   for (size_t f = 0; f < training.size(); ++f) {
     const int i = training[f];
@@ -163,7 +170,6 @@ StageOutcome Reconstruct(RunContext* context, const JsonValue& inputs,
         "leave nothing of any photo to fit",
         settings.pose.photo_masks.empty() ? "the masks" : settings.pose.photo_masks,
         "make the masks' white parts larger");
-  ProgressParts parts(progress, kTrial + 1 + kAfterFit);
   EffectReport& view_dependence =
       *std::ranges::find(profile.effects, kViewDependence, &EffectReport::name);
   const ProgressFunction trial = parts.Next(kTrial);
@@ -237,6 +243,8 @@ Stage ReconstructStage(RunContext* context) {
                                    {"holdout", run.holdout},
                                    {"effects", run.effects},
                                    {"reproducible", run.reproducible}};
+  if (const std::string& network = context->settings.depth.network; !network.empty())
+    stage.inputs["depth_network"] = HashFile(network);
   stage.refuse_changes = true;
   const bool posed = context->workspace->Find("pose").has_value();
   if (posed && run.max_memory_gb > 0)

@@ -11,7 +11,6 @@
 #include "pipeline/fields/field_file.h"
 #include "pipeline/files/json_file.h"
 #include "pipeline/images/image_file.h"
-#include "pipeline/page/make_page.h"
 #include "pipeline/stages/object_edit.h"
 #include "pipeline/stages/styled_field.h"
 #include "pipeline/workspace/style_folders.h"
@@ -257,48 +256,6 @@ TEST(Styles, NothingOfThePhotosMetadataLeaves) {
       EXPECT_EQ(bytes.find(secret), std::string::npos) << entry.path();
   }
   EXPECT_GT(files, 20);
-}
-
-// With the layer of an edited photo.
-TEST(Parts, OfARetouchedSceneAreTheSameBytes) {
-  const TemporaryFolder folder;
-  Synth(folder);
-  testing::Said(RunOf(folder, "e", {"--style", Asset("sunset"), "--until", "stylize"}));
-  Image edited = ReadImage(folder / "s/images/00001.png");
-  for (int y = 0; y < edited.height; ++y)
-    for (int i = 0; i < 3 * edited.width / 2; ++i) edited.at(0, y)[i] *= 0.3f;
-  WritePng8(folder / "edited.png", edited);
-  testing::Said({"retouch", folder / "e", "--photo", "00001", "--edited", folder / "edited.png",
-                 "--name", "half", "--until", "render"});
-  const std::string style = folder / "e/styles/half";
-  ASSERT_TRUE(fs::exists(style + "/layers"));
-  const auto whole = testing::ResultsOf(style);
-  fs::remove_all(style + "/frames");
-  for (const char* film : {"styled.mp4", "source_vs_styled.mp4", "views_2d.mp4"})
-    ASSERT_TRUE(fs::remove(style + "/" + film)) << film;
-  for (const char* part : {"1/3", "2/3", "3/3"})
-    testing::Said({"render", folder / "e", "--name", "half", "--part", part});
-  testing::Said({"render", folder / "e", "--name", "half", "--join", "--until", "render"});
-  EXPECT_EQ(testing::ResultsOf(style), whole);
-}
-
-TEST(Page, OfAFieldThatIsTooLargeHasWhatPhotosShowMost) {
-  const TemporaryFolder folder;
-  Synth(folder);
-  testing::Said(
-      RunOf(folder, "e", {"--style", Asset("sunset"), "--no-films", "--until", "stylize"}));
-  const auto page = [&](int64_t most_bytes) {
-    return MakePage(folder / "e", {"style_sunset"}, {.most_bytes = most_bytes}, {});
-  };
-  const MadePage whole = page(0), roomy = page(whole.bytes), tight = page(whole.bytes - 5000);
-  EXPECT_EQ(roomy.html, whole.html);
-  EXPECT_LE(std::ssize(tight.html), whole.bytes - 5000);
-  EXPECT_GT(std::ssize(tight.html), whole.bytes - 20000);
-  EXPECT_LT(tight.records, whole.records);
-  EXPECT_GT(tight.report.size(), whole.report.size());
-  const MadePage none = page(1000);
-  EXPECT_TRUE(none.html.empty());
-  EXPECT_GT(none.bytes, 1000);
 }
 
 TEST(Stills, HaveThePhotosSizeAndASrgbTag) {
