@@ -31,8 +31,8 @@ struct OptionInfo {
   // Texts that lead out of a run's folder. Of a command that continues a folder, which may come
   // from somebody else, its run.json alone is not enough for them. Each is a list of beginnings
   // with "|" between: "*" is any text but an empty one, "!TEXT" an exception. What is only
-  // looked at as a picture (--style) is not among them, nor what stage pose alone uses: no such
-  // command runs that.
+  // looked at as a picture (--style) is not among them, nor what stages pose and reconstruct
+  // alone use: no such command runs those.
   const char* runs = "";   // programs, and networks
   const char* reads = "";  // files and folders; those in the run's folder are its own
   bool once = false;       // of one start: not taken from a run's folder

@@ -5,7 +5,6 @@
 
 #include "kernels/base/error.h"
 #include "kernels/image/resize.h"
-#include "kernels/onnx/onnx_model.h"
 #include "pipeline/files/text.h"
 
 namespace regrade {
@@ -13,6 +12,7 @@ namespace {
 
 constexpr size_t kLeastKnown = 20;
 constexpr double kAgreed = 0.05, kMostError = 0.15, kMostOfConstant = 0.5;
+constexpr double kBeyond = 2;         // times the depths that are known
 constexpr double kLeastError = 0.05;  // of what only a network says
 constexpr double kGuessJump = 0.05;   // between neighbours, of the depth
 constexpr int kCells = 32;            // along the longer side
@@ -74,35 +74,6 @@ bool IsOneSurface(const Image& z, int x, int y) {
   return here > 0;
 }
 
-// [1, 3, H, W] of a photo.
-Image GuessOf(const OnnxModel& network, const Image& photo) {
-  constexpr double kMean[] = {0.485, 0.456, 0.406}, kDeviation[] = {0.229, 0.224, 0.225};
-  const double scale =
-      static_cast<double>(kNetworkSide) / std::max(photo.width, photo.height) / kPatch;
-  const auto side = [&](int pixels) {
-    return kPatch * std::max(1, static_cast<int>(std::lround(pixels * scale)));
-  };
-  const Image small = Resize(photo, side(photo.width), side(photo.height));
-  const int64_t n = small.num_pixels();
-  std::vector<float> values(static_cast<size_t>(3 * n));
-  for (int64_t i = 0; i < n; ++i)
-    for (int c = 0; c < 3; ++c) {
-      const double color = double{small.pixels[static_cast<size_t>(3 * i + c)]};
-      values[static_cast<size_t>(c * n + i)] = static_cast<float>(
-          ((std::isfinite(color) ? color : kMean[c]) - kMean[c]) / kDeviation[c]);
-    }
-  const OnnxArray output =
-      network.Run({{"", {1, 3, small.height, small.width}, values.data()}}, {},
-                  "one input [1, 3, H, W] with sides that are multiples of 14")[0];
-  std::vector<int> shape = output.shape;
-  std::erase(shape, 1);
-  if (shape.size() != 2)
-    network.Refuse("its output is no picture of depths", "give a network of relative depth");
-  Image guess(shape[1], shape[0], 1);
-  guess.pixels = output.values;
-  return guess;
-}
-
 std::vector<KnownDepth> KnownDepthsOf(const Camera& camera, const std::vector<SeenPoint>& seen,
                                       const Image& guess) {
   std::vector<KnownDepth> known;
@@ -151,6 +122,34 @@ int AddOpenPlaces(const Camera& camera, const AlignedGuess& guess,
 
 }  // namespace
 
+Image GuessDepth(const OnnxModel& network, const Image& photo) {
+  constexpr double kMean[] = {0.485, 0.456, 0.406}, kDeviation[] = {0.229, 0.224, 0.225};
+  const double scale =
+      static_cast<double>(kNetworkSide) / std::max(photo.width, photo.height) / kPatch;
+  const auto side = [&](int pixels) {
+    return kPatch * std::max(1, static_cast<int>(std::lround(pixels * scale)));
+  };
+  const Image small = Resize(photo, side(photo.width), side(photo.height));
+  const int64_t n = small.num_pixels();
+  std::vector<float> values(static_cast<size_t>(3 * n));
+  for (int64_t i = 0; i < n; ++i)
+    for (int c = 0; c < 3; ++c) {
+      const double color = double{small.pixels[static_cast<size_t>(3 * i + c)]};
+      values[static_cast<size_t>(c * n + i)] = static_cast<float>(
+          ((std::isfinite(color) ? color : kMean[c]) - kMean[c]) / kDeviation[c]);
+    }
+  const OnnxArray output =
+      network.Run({{"", {1, 3, small.height, small.width}, values.data()}}, {},
+                  "one input [1, 3, H, W] with sides that are multiples of 14")[0];
+  std::vector<int> shape = output.shape;
+  std::erase(shape, 1);
+  if (shape.size() != 2)
+    network.Refuse("its output is no picture of depths", "give a network of relative depth");
+  Image guess(shape[1], shape[0], 1);
+  guess.pixels = output.values;
+  return guess;
+}
+
 std::optional<AlignedGuess> AlignGuess(const Image& guess,
                                        const std::vector<KnownDepth>& known) {
   REGRADE_CHECK(guess.channels == 1);
@@ -172,10 +171,12 @@ std::optional<AlignedGuess> AlignGuess(const Image& guess,
   }
   if (!(best.error <= kMostError) || !(best.error <= kMostOfConstant * constant))
     return std::nullopt;
+  const auto [least, most] = std::ranges::minmax(known, {}, &KnownDepth::depth);
   AlignedGuess aligned{guess, best.error};
   for (float& value : aligned.z.pixels) {
     const double at = best.a * double{value} + best.b, z = inverse ? 1 / at : at;
-    value = at > 0 && std::isfinite(z) ? static_cast<float>(z) : 0.0f;
+    const bool is_depth = at > 0 && z > least.depth / kBeyond && z < kBeyond * most.depth;
+    value = is_depth ? static_cast<float>(z) : 0.0f;
   }
   return aligned;
 }
@@ -192,7 +193,7 @@ void AddGuessedDepths(const std::string& network, const WorkingViews& views,
     ReportOrThrow(progress, static_cast<double>(k), static_cast<double>(of.size()), "depths");
     const Image photo = views.Photo(of[k]);
     const Camera camera = views.CameraOf(of[k]);
-    const Image guess = GuessOf(model, photo);
+    const Image guess = GuessDepth(model, photo);
     const std::vector<KnownDepth> known = KnownDepthsOf(camera, (*seen)[k], guess);
     if (const std::optional<AlignedGuess> aligned = AlignGuess(guess, known))
       added += AddOpenPlaces(camera, *aligned, known, &(*seen)[k]);

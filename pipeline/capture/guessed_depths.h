@@ -6,11 +6,16 @@
 #include <vector>
 
 #include "kernels/base/progress.h"
+#include "kernels/onnx/onnx_model.h"
 #include "kernels/scene/image.h"
 #include "pipeline/capture/working_views.h"
 #include "reconstruct/scene/point_observations.h"
 
 namespace regrade {
+
+// [H, W, 1] of a photo: what AlignGuess takes. `network`: see AddGuessedDepths. Throws
+// Error(kExternalProgram).
+Image GuessDepth(const OnnxModel& network, const Image& photo);
 
 struct KnownDepth {
   double x = 0, y = 0;  // pixels of the guess
@@ -27,16 +32,17 @@ struct AlignedGuess {
 // r^2 / (1 + r^2) with r = e / 0.05 (Geman and McClure's), from where Huber's has its minimum;
 // s is 1 for a guess of inverse depth and -1 for one of depth, whichever leaves less. Empty
 // where fewer than 20 depths are known, where an error of more than 0.15 is left, or where the
-// guess leaves more than half of what b alone does. `guess` is [H, W, 1].
+// guess leaves more than half of what b alone does. Beyond twice the known depths, and before
+// half of them, a guess is none. `guess` is [H, W, 1].
 std::optional<AlignedGuess> AlignGuess(const Image& guess,
                                        const std::vector<KnownDepth>& known);
 
-// Adds to the points of each of the views `of`, in the field's frame, one for each 32nd of the
-// photo's longer side where it has none: open places of a few photos, and walls without
-// texture. `network`: an ONNX file that takes [1, 3, H, W], colours less ImageNet's mean over
-// its deviation, sides multiples of 14 and at most 518, and gives [H, W], as the relative
-// networks of Depth Anything do. Photos whose points disagree with the guess are left out by
-// name. Throws Error(kExternalProgram) for a network that is none.
+// Adds to the points of each of the views `of`, in the field's frame, one for each square cell
+// of a 32nd of the photo's longer side without a point in or beside it: open places of a few
+// photos, and walls without texture. `network`: an ONNX file that takes [1, 3, H, W], colours
+// less ImageNet's mean over its deviation, sides multiples of 14 and at most 518, and gives [H,
+// W], as the relative networks of Depth Anything do. Photos whose points disagree with the
+// guess are left out by name. Throws Error(kExternalProgram) for a network that is none.
 void AddGuessedDepths(const std::string& network, const WorkingViews& views,
                       const std::vector<int>& of, const ProgressFunction& progress,
                       std::vector<std::vector<SeenPoint>>* seen,

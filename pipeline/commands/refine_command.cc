@@ -69,6 +69,8 @@ void MakeBlocks(RunContext* context, const BlockFolder& folder) {
   if (views.capture().rendered)
     throw InputError("its splats were given without photos to fit them to",
                      context->workspace->folder(), "reconstruct a scene from photos");
+  if (!context->settings.depth.network.empty())
+    console->Info("blocks are fitted without the depths of --depth-network");
   console->BeginStage("refine", "refining the scene in blocks");
   const BlockPlan plan = PlanOf(*context, views, coarse, folder);
   std::vector<int> left = BlocksToMake(plan, folder, context->refine.part), made;

@@ -41,6 +41,10 @@ void ProbeInputs(const std::string& command, RunContext* context) {
     HashFolder(masks);
     masks = AbsolutePath(masks);
   }
+  if (std::string& network = context->settings.depth.network; !network.empty()) {
+    network = AbsolutePath(network);
+    ProbeDepthNetwork(network);
+  }
   if (command != "run") return;
   ProbeStyles(&context->settings, context->console);
   ProbeEvaluationNetworks(context->settings.consistency);

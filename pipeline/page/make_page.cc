@@ -229,10 +229,20 @@ class RankedSplats {
   std::vector<int64_t> order_;
 };
 
-// How many splats the page may have, after one of `made` that has too many bytes.
-int64_t FewerSplats(const MadePage& made, int64_t most_bytes) {
-  const int64_t left = most_bytes - (made.bytes - made.field_bytes);
-  return std::max(int64_t{1}, made.records * left / made.field_bytes * 99 / 100);
+// How many splats the page may have, after one of `made` that has too many bytes, and after
+// `before` with more splats; 0 where none fit.
+int64_t FewerSplats(const MadePage& made, const MadePage* before, int64_t most_bytes) {
+  double each;  // bytes of a splat
+  if (before != nullptr && before->records > made.records && before->bytes > made.bytes) {
+    each = static_cast<double>(before->bytes - made.bytes) /
+           static_cast<double>(before->records - made.records);
+  } else {
+    int64_t of_splats = made.field_bytes;  // and a little of networks
+    for (const int64_t bytes : made.style_bytes) of_splats += bytes;
+    each = static_cast<double>(of_splats) / static_cast<double>(made.records);
+  }
+  const double too_many = static_cast<double>(made.bytes - most_bytes) / each;
+  return std::max(int64_t{0}, made.records - 1 - static_cast<int64_t>(1.02 * too_many));
 }
 
 MadePage PageWithin(const std::string& folder, const std::vector<std::string>& styles,
@@ -243,6 +253,7 @@ MadePage PageWithin(const std::string& folder, const std::vector<std::string>& s
   const int64_t count = CountSplats(path);
   int64_t most = count > 0 ? options.most_bytes / kLeastSplatBytes : 1;
   std::optional<RankedSplats> ranked;
+  std::optional<MadePage> before;
   for (int i = 1;; ++i) {
     const bool all = count <= most;
     if (!all && !ranked) ranked.emplace(path, folder);
@@ -251,11 +262,10 @@ MadePage PageWithin(const std::string& folder, const std::vector<std::string>& s
     const bool fits = made.bytes <= options.most_bytes;
     if (fits && !all) made.report.push_back(ranked->Line(made));
     if (fits) return made;
-    if (count == 0 || i == kTries) {
-      made.html.clear();
-      return made;
-    }
-    most = FewerSplats(made, options.most_bytes);
+    most = FewerSplats(made, before ? &*before : nullptr, options.most_bytes);
+    made.html.clear();
+    if (count == 0 || most == 0 || i == kTries) return made;
+    before = std::move(made);
   }
 }
 

@@ -14,9 +14,8 @@ struct DepthChoice {
   void Describe(Bind& bind) {
     bind("depth-network", network,
          {.help = "an ONNX network that guesses depth or inverse depth from a photo, such as "
-                  "Depth Anything's: splats are held near its guesses where a photo has no "
-                  "points of COLMAP's",
-          .runs = "*"});
+                  "Depth Anything's: where a photo has no points of COLMAP's, splats start at "
+                  "its guesses and are held near them"});
   }
 };
 

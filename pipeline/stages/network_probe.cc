@@ -8,6 +8,7 @@
 #include "evaluate/edge_network.h"
 #include "evaluate/pair_network.h"
 #include "kernels/base/error.h"
+#include "pipeline/capture/guessed_depths.h"
 #include "pipeline/program/crash_probe.h"
 #include "stylize/image/onnx_stylizer.h"
 #include "stylize/image/region_features.h"
@@ -15,7 +16,8 @@
 namespace regrade {
 namespace {
 
-constexpr char kStyle[] = "style", kPair[] = "pair", kEdges[] = "edges", kRegions[] = "regions";
+constexpr char kStyle[] = "style", kPair[] = "pair", kEdges[] = "edges", kRegions[] = "regions",
+               kDepths[] = "depths";
 
 void OpenStyleNetwork(const std::string& path) { MakeOnnxStylizer(path, 64, Image(64, 64)); }
 
@@ -24,6 +26,8 @@ void OpenFeatureNetwork(const std::string& path) {
   const RegionFeatures opened(path, pictures);
   for (const Image& picture : pictures) opened.Of(picture);
 }
+
+void OpenDepthNetwork(const std::string& path) { GuessDepth(OnnxModel(path), Image(64, 48)); }
 
 void ProbePairNetwork(const std::string& path) {
   RunCrashProbe(kPair, path);
@@ -48,6 +52,11 @@ void ProbeFeatureNetwork(const std::string& path) {
   OpenFeatureNetwork(path);
 }
 
+void ProbeDepthNetwork(const std::string& path) {
+  RunCrashProbe(kDepths, path);
+  OpenDepthNetwork(path);
+}
+
 void ProbeEvaluationNetworks(const ConsistencyOptions& options) {
   constexpr char kOnnx[] = "onnx:";
   if (options.flow.starts_with(kOnnx)) ProbePairNetwork(options.flow.substr(sizeof(kOnnx) - 1));
@@ -65,6 +74,7 @@ void RunNetworkProbe(const std::vector<std::string>& arguments) {
   try {
     if (kind == kStyle) return OpenStyleNetwork(path);
     if (kind == kRegions) return OpenFeatureNetwork(path);
+    if (kind == kDepths) return OpenDepthNetwork(path);
     const Image picture(64, 64, 3);
     if (kind == kEdges) return (void)EdgeNetwork(path).EdgeMap(picture);
     if (kind == kPair) {

@@ -14,6 +14,9 @@ void ProbeStyleNetwork(const std::string& path);
 // The network of --match-network, likewise.
 void ProbeFeatureNetwork(const std::string& path);
 
+// The network of --depth-network, likewise.
+void ProbeDepthNetwork(const std::string& path);
+
 // The networks of `options`: each compares two small pictures in the child. Throws
 // Error(kExternalProgram) naming the file.
 void ProbeEvaluationNetworks(const ConsistencyOptions& options);

@@ -133,7 +133,7 @@ void RenderPart(const Stage& stage, RunContext* context) {
   console->BeginStage("render", title);
   std::vector<Camera> cameras = CamerasOf(units);
   // Photos with layers say where their edits are, see CarriedEdit.
-  if (context->settings.residual.On())
+  if (!context->settings.residual.Layers().empty())
     std::ranges::copy(plan.views.Cameras(), std::back_inserter(cameras));
   SceneFrames frames(context, plan, SeenPart(std::move(geometry), field, cameras),
                      [](StoredField) {});

@@ -36,6 +36,8 @@ constexpr SceneSource kPhotos{
 
 // What decides a fit decides nothing here.
 void RefuseFlagsOfFits(const OptionSet& options) {
+  if (options.Given("depth-network"))
+    throw UsageError("a file of splats is not fitted", "--depth-network", "leave it out");
   for (const FitKind* kind : FitKinds()) {
     const JsonValue of_fit = kind->options({});
     for (const auto& [name, value] : of_fit.AsObject())

@@ -6,12 +6,14 @@
 
 #include <algorithm>
 #include <cmath>
+#include <filesystem>
 #include <functional>
 
 #include "kernels/synthetic/ray_trace.h"
 #include "kernels/synthetic/synthetic_scene.h"
 #include "pipeline/images/image_file.h"
 #include "tests/support/expect_error.h"
+#include "tests/support/source_dir.h"
 #include "tests/support/spawn.h"
 #include "tests/support/temporary_folder.h"
 #include "tests/support/tiny_onnx.h"
@@ -20,6 +22,7 @@
 namespace regrade {
 namespace {
 
+namespace fs = std::filesystem;
 using testing::TemporaryFolder;
 
 // A ramp of depths from 2 to 10, as known at some places, a fifth of them wrong by half.
@@ -55,6 +58,19 @@ TEST(AlignGuess, ScaleAndShiftAreFoundBesideOutliers) {
     for (size_t i = 0; i < ramp.z.pixels.size(); ++i)
       ASSERT_NEAR(aligned->z.pixels[i], ramp.z.pixels[i], 0.01f * ramp.z.pixels[i]);
   }
+}
+
+// Of a sky there is no point; its inverse depth is next to 0.
+TEST(AlignGuess, WhatIsFarBeyondThePointsIsNoDepth) {
+  const Ramp ramp(100);
+  Image guess = ramp.Guess([](float z) { return 1 / z; });
+  for (int x = 0; x < guess.width; ++x) guess.at(x, 0)[0] = 0.01f;
+  std::vector<KnownDepth> known = ramp.known;
+  std::erase_if(known, [](const KnownDepth& at) { return at.y < 1; });
+  const std::optional<AlignedGuess> aligned = AlignGuess(guess, known);
+  ASSERT_TRUE(aligned);
+  for (int x = 0; x < guess.width; ++x) EXPECT_EQ(aligned->z.at(x, 0)[0], 0) << x;
+  EXPECT_GT(aligned->z.at(5, 5)[0], 2);
 }
 
 TEST(AlignGuess, WhatKnowsNothingIsLeftOut) {
@@ -95,17 +111,48 @@ TEST(GuessedDepths, BecomePointsOfAFitWherePhotosHaveNone) {
   const auto reconstruct = [&](const std::string& out, const std::string& field,
                                const std::string& file) {
     return testing::Regrade(
-        {"reconstruct", folder / "s", "--out", folder / out, "--device", "cpu",
-         "--effects", "exposure=off,pose-refinement=off", "--depth-network", folder / file},
+        {"reconstruct", folder / "s", "--out", folder / out, "--device", "cpu", "--effects",
+         "exposure=off,pose-refinement=off", "--depth-network", folder / file},
         testing::TinyFlags(field));
   };
   const testing::ProgramOutcome outcome = reconstruct("o", "splats", "mean.onnx");
   ASSERT_EQ(outcome.code, 0) << outcome.text;
-  EXPECT_SAYS(outcome, "guessed depths where photos have no points");
+  const size_t said = outcome.text.find(" guessed depths where photos have no points");
+  ASSERT_NE(said, std::string::npos) << outcome.text;
+  EXPECT_GT(std::stoi(outcome.text.substr(outcome.text.rfind('\n', said) + 1)), 20);
   EXPECT_EQ(outcome.text.find("left out"), std::string::npos) << outcome.text;
-  EXPECT_EQ(outcome.text.find(" 0 guessed"), std::string::npos) << outcome.text;
-  EXPECT_EQ(reconstruct("v", "voxels", "mean.onnx").code, static_cast<int>(ExitCode::kUsage));
-  EXPECT_NE(reconstruct("n", "splats", "none.onnx").code, 0);
+  // They lie on the scene's surfaces, and away from the photo's points.
+  const WorkingViews views = ReadWorkingViews(folder / "o/poses", 96, 0);
+  const std::vector<int> of = {1, 4};
+  std::vector<std::vector<SeenPoint>> seen = PointsSeenBy(views.capture(), of, {});
+  std::vector<std::string> notes;
+  const auto points = seen;
+  AddGuessedDepths(folder / "mean.onnx", views, of, {}, &seen, &notes);
+  for (size_t k = 0; k < of.size(); ++k) {
+    const Camera& camera = cameras[static_cast<size_t>(of[k])];
+    const Image truth = RenderSyntheticView(scene, camera).depth;
+    int near = 0, added = 0;
+    for (size_t i = points[k].size(); i < seen[k].size(); ++i, ++added) {
+      double x, y, depth;
+      ASSERT_TRUE(camera.Project(seen[k][i].position.Cast<double>(), &x, &y, &depth));
+      const float z = *truth.at(std::clamp(static_cast<int>(x), 0, 95),
+                                std::clamp(static_cast<int>(y), 0, 71));
+      near += std::abs(depth / double{z} - 1) < 0.1;
+    }
+    EXPECT_GT(added, 3);
+    EXPECT_GE(near, 0.8 * added);
+  }
+  // What continues the folder needs no network, and asks nothing.
+  fs::rename(folder / "mean.onnx", folder / "moved.onnx");
+  const testing::ProgramOutcome styled = testing::Regrade(
+      {"stylize", folder / "o", "--style", testing::SourceDir() + "/assets/style_sunset.png",
+       "--until", "stylize"});
+  EXPECT_EQ(styled.code, 0) << styled.text;
+  EXPECT_EQ(reconstruct("v", "voxels", "moved.onnx").code, static_cast<int>(ExitCode::kUsage));
+  const testing::ProgramOutcome none = reconstruct("n", "splats", "none.onnx");
+  EXPECT_EQ(none.code, static_cast<int>(ExitCode::kExternalProgram)) << none.text;
+  EXPECT_SAYS(none, "none.onnx");
+  EXPECT_FALSE(fs::exists(folder / "n"));
 }
 
 }  // namespace
