@@ -4,7 +4,9 @@
 #include <cmath>
 
 #include "kernels/base/error.h"
+#include "kernels/base/quantile.h"
 #include "kernels/image/resize.h"
+#include "pipeline/capture/measured_depths.h"
 #include "pipeline/files/text.h"
 
 namespace regrade {
@@ -14,7 +16,6 @@ constexpr size_t kLeastKnown = 20;
 constexpr double kAgreed = 0.05, kMostError = 0.15, kMostOfConstant = 0.5;
 constexpr double kBeyond = 2;         // times the depths that are known
 constexpr double kLeastError = 0.05;  // of what only a network says
-constexpr double kGuessJump = 0.05;   // between neighbours, of the depth
 constexpr int kCells = 32;            // along the longer side
 constexpr int kPatch = 14, kNetworkSide = 518;
 
@@ -26,12 +27,6 @@ struct Row {
 struct Line {
   double a = 0, b = 0, error = INFINITY;
 };
-
-double MedianOfResiduals(std::vector<double> values) {
-  const auto middle = values.begin() + std::ssize(values) / 2;
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
 
 // By reweighted least squares; with `constant` a is 0.
 Line FitLine(const std::vector<Row>& rows, bool constant) {
@@ -60,19 +55,11 @@ Line FitLine(const std::vector<Row>& rows, bool constant) {
       weights[i] = round < kHuberRounds ? 1 / std::max(1.0, r) : falls * falls;
     }
   }
-  line.error = kSigmaOfMedian * MedianOfResiduals(left);
+  line.error = kSigmaOfMedian * Median(left);
   return line;
 }
 
 float At(const Image& image, int x, int y) { return image.at(x, y)[0]; }
-
-bool IsOneSurface(const Image& z, int x, int y) {
-  if (x < 1 || y < 1 || x + 1 >= z.width || y + 1 >= z.height) return false;
-  const float here = At(z, x, y);
-  for (const float there : {At(z, x - 1, y), At(z, x + 1, y), At(z, x, y - 1), At(z, x, y + 1)})
-    if (!(std::abs(there - here) < static_cast<float>(kGuessJump) * here)) return false;
-  return here > 0;
-}
 
 std::vector<KnownDepth> KnownDepthsOf(const Camera& camera, const std::vector<SeenPoint>& seen,
                                       const Image& guess) {

@@ -5,6 +5,7 @@
 #include <filesystem>
 
 #include "kernels/base/error.h"
+#include "kernels/base/quantile.h"
 #include "pipeline/capture/photo_names.h"
 #include "pipeline/files/json_file.h"
 #include "pipeline/files/text.h"
@@ -28,12 +29,6 @@ fs::path StagedDepthOf(const std::string& photo_path) {
   return path.parent_path().parent_path() / "depths" / path.filename();
 }
 
-double MedianOf(std::vector<double> values) {
-  const auto middle = values.begin() + std::ssize(values) / 2;
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
-
 // A view's map, in world units.
 struct DepthMap {
   Image z;
@@ -43,14 +38,6 @@ struct DepthMap {
   // 0 beyond the map.
   float At(int x, int y) const {
     return x >= 0 && y >= 0 && x < z.width && y < z.height ? z.at(x, y)[0] : 0.0f;
-  }
-
-  // Whether the pixel and its neighbours are of one surface.
-  bool IsSmooth(int x, int y) const {
-    const float here = At(x, y);
-    for (const float there : {At(x - 1, y), At(x + 1, y), At(x, y - 1), At(x, y + 1)})
-      if (!(std::abs(there - here) < static_cast<float>(kJump) * here)) return false;
-    return true;
   }
 };
 
@@ -116,7 +103,7 @@ Agreement Judge(std::vector<DepthMap>* maps) {
   std::vector<double> all;
   for (const DepthMap& map : *maps) all.insert(all.end(), map.ratios.begin(), map.ratios.end());
   if (all.size() < kEnoughToJudge) return found;
-  found.unit = MedianOf(all);
+  found.unit = Median(all);
   std::vector<double> errors;
   for (DepthMap& map : *maps) {
     size_t agree = 0;
@@ -128,7 +115,7 @@ Agreement Judge(std::vector<DepthMap>* maps) {
     if (!map.wrong) errors.insert(errors.end(), map.ratios.begin(), map.ratios.end());
   }
   constexpr double kSigmaOfMedian = 1.4826;  // of a normal distribution
-  if (!errors.empty()) found.error = kSigmaOfMedian * MedianOf(errors);
+  if (!errors.empty()) found.error = kSigmaOfMedian * Median(errors);
   return found;
 }
 
@@ -139,7 +126,7 @@ void AddPoints(const DepthMap& map, const Camera& camera, const Agreement& found
   const RigidTransform world_from_camera = camera.camera_from_world.Inverse();
   for (int y = step / 2; y < map.z.height; y += step)
     for (int x = step / 2; x < map.z.width; x += step) {
-      if (!map.IsSmooth(x, y)) continue;
+      if (!IsOneSurface(map.z, x, y)) continue;
       const double depth = double{map.At(x, y)} / found.unit;
       const Vec3d ray = camera.CameraRay((x + 0.5) * camera.width / map.z.width,
                                          (y + 0.5) * camera.height / map.z.height);
@@ -151,6 +138,15 @@ void AddPoints(const DepthMap& map, const Camera& camera, const Agreement& found
 }
 
 }  // namespace
+
+bool IsOneSurface(const Image& z, int x, int y) {
+  if (x < 1 || y < 1 || x + 1 >= z.width || y + 1 >= z.height) return false;
+  const float here = *z.at(x, y);
+  for (const float* const there :
+       {z.at(x - 1, y), z.at(x + 1, y), z.at(x, y - 1), z.at(x, y + 1)})
+    if (!(std::abs(*there - here) < static_cast<float>(kJump) * here)) return false;
+  return true;
+}
 
 int StageDepths(const std::vector<std::string>& maps, const std::vector<StagedPhoto>& photos,
                 double unit, const std::string& folder, std::vector<std::string>* notes) {

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "kernels/scene/capture.h"
+#include "kernels/scene/image.h"
 #include "reconstruct/scene/point_observations.h"
 
 namespace regrade {
@@ -21,6 +22,10 @@ int StageDepths(const std::vector<std::string>& maps, const std::vector<StagedPh
 // Adds the maps that StageDepths wrote to `folder`, by the photos' names there, and their unit.
 void FindStagedDepths(const std::string& folder, std::map<std::string, std::string>* maps,
                       double* unit);
+
+// Whether a pixel of a map of depths [H, W, 1] and its four neighbours are of one surface:
+// within 5 % of its depth. False at the map's border, and where there is no depth.
+bool IsOneSurface(const Image& z, int x, int y);
 
 // PointsSeenBy with points of the staged depth maps, of which there may be none.
 //
