@@ -89,12 +89,13 @@ class ResidualFit {
                       context_->settings.run.seed + static_cast<uint64_t>(i), &rays);
     }
     const ProgressFunction fitting = parts.Next(1);
+    const ResidualBounds bounds = BoundsWith(so_far, start);
     if (rays.num_rays() == 0) return std::vector<Vec3d>(static_cast<size_t>(graph_.voxels));
     if (!start.empty()) {
       const std::vector<Vec3d> seen = SumAlongRays(rays, start);
       for (size_t r = 0; r < seen.size(); ++r) rays.missing[r] += seen[r].Cast<float>();
     }
-    return FitResidual(graph_, rays, options, std::move(start), fitting);
+    return FitResidual(graph_, rays, options, bounds, std::move(start), fitting);
   }
 
   // rho of colours that are added to the styled field.
@@ -103,6 +104,17 @@ class ResidualFit {
   }
 
  private:
+  // Where colours behind the network, with what `so_far` has beyond `start`, are black or
+  // white.
+  ResidualBounds BoundsWith(const VoxelResidual& so_far,
+                            const std::vector<Vec3d>& start) const {
+    Appearance appearance = styled_.field.appearance;
+    VoxelResidual others{so_far.color, {}};
+    for (size_t v = 0; v < start.size(); ++v) others.color[v] += start[v].Cast<float>() * -1.0f;
+    if (!others.color.empty()) AddResidual(others, &appearance);
+    return BoundsOfColors(appearance);
+  }
+
   RunContext* context_;
   const WorkingViews& views_;
   const StoredField& source_;

@@ -1,6 +1,7 @@
 #include "stylize/field/voxel_residual.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <utility>
 
@@ -25,6 +26,61 @@ double Product(const Colors& a, const Colors& b) {
   double sum = 0;
   for (const double s : sums) sum += s;
   return sum;
+}
+
+// x + y f
+Colors Sum(Colors x, const Colors& y, double f) {
+#pragma omp parallel for schedule(static)
+  for (int64_t v = 0; v < std::ssize(x); ++v)
+    x[static_cast<size_t>(v)] += y[static_cast<size_t>(v)] * f;
+  return x;
+}
+
+Colors Within(const ResidualBounds& bounds, Colors x) {
+  for (size_t v = 0; v < bounds.least.size(); ++v)
+    for (int c = 0; c < 3; ++c)
+      x[v][c] = std::clamp(x[v][c], bounds.least[v][c], bounds.most[v][c]);
+  return x;
+}
+
+// The channels that are at a bound from which the energy falls outwards: they stay there.
+class Held {
+ public:
+  Held(const ResidualBounds& bounds, const Colors& x, const Colors& descent)
+      : channels_(bounds.least.size()) {
+    for (size_t v = 0; v < channels_.size(); ++v)
+      for (int c = 0; c < 3; ++c)
+        channels_[v][c] = (x[v][c] <= bounds.least[v][c] && descent[v][c] < 0) ||
+                          (x[v][c] >= bounds.most[v][c] && descent[v][c] > 0);
+  }
+
+  Colors Without(Colors x) const {
+    for (size_t v = 0; v < channels_.size(); ++v)
+      for (int c = 0; c < 3; ++c)
+        if (channels_[v][c]) x[v][c] = 0;
+    return x;
+  }
+
+ private:
+  std::vector<std::array<bool, 3>> channels_;
+};
+
+// x + step, or as much of it, between the bounds, as lowers the quadratic.
+Colors StepWithin(const ResidualBounds& bounds, const ResidualQuadratic& quadratic,
+                  const Colors& x, const Colors& descent, const Colors& step) {
+  if (bounds.least.empty()) return Sum(x, step, 1);
+  constexpr int kHalvings = 4;
+  for (int k = 0; k < kHalvings; ++k) {
+    Colors next = Within(bounds, Sum(x, step, std::ldexp(1.0, -k)));
+    const Colors moved = Sum(next, x, -1);
+    if (Product(moved, quadratic.Apply(moved)) < 2 * Product(moved, descent)) return next;
+  }
+  return x;
+}
+
+double ColorBefore(const Appearance& appearance, size_t voxel, int channel) {
+  return 0.5 + kSh0 * double{appearance.sh[static_cast<int64_t>(voxel) * appearance.stride() +
+                                           channel * appearance.basis]};
 }
 
 }  // namespace
@@ -62,10 +118,11 @@ double ResidualEnergy(const VoxelGraph& graph, const ResidualRays& rays,
 }
 
 std::vector<Vec3d> FitResidual(const VoxelGraph& graph, const ResidualRays& rays,
-                               const ResidualOptions& options, std::vector<Vec3d> start,
-                               const ProgressFunction& progress) {
+                               const ResidualOptions& options, const ResidualBounds& bounds,
+                               std::vector<Vec3d> start, const ProgressFunction& progress) {
   Colors x = std::move(start);
   x.resize(static_cast<size_t>(graph.voxels));
+  x = Within(bounds, std::move(x));
   Colors missing;
   for (const Vec3f& t : rays.missing) missing.push_back(t.Cast<double>());
   ResidualQuadratic quadratic(graph, rays, options.pull);
@@ -73,33 +130,26 @@ std::vector<Vec3d> FitResidual(const VoxelGraph& graph, const ResidualRays& rays
   double enough = 0;
   for (int turn = 0; turn < options.turns; ++turn) {
     quadratic.TouchAt(x, options.cost, options.width);
-    Colors r = quadratic.Apply(x);
-    for (size_t v = 0; v < r.size(); ++v) r[v] = right[v] - r[v];
-    Colors z = quadratic.Precondition(r), p = z;
+    const Colors descent = Sum(right, quadratic.Apply(x), -1);
+    const Held held(bounds, x, descent);
+    Colors r = held.Without(descent), z = held.Without(quadratic.Precondition(r)), p = z;
+    Colors step(x.size());
     double rz = Product(r, z);
     if (turn == 0) enough = 1e-12 * rz;
-    for (int step = 0; step < options.steps && rz > enough; ++step) {
-      ReportOrThrow(progress, turn * options.steps + step, options.turns * options.steps,
+    for (int k = 0; k < options.steps && rz > enough; ++k) {
+      ReportOrThrow(progress, turn * options.steps + k, options.turns * options.steps,
                     "residual by voxel");
       const Colors q = quadratic.Apply(p);
       const double along = Product(p, q);
       if (!(along > 0)) break;
-      const double a = rz / along;
-#pragma omp parallel for schedule(static)
-      for (int64_t i = 0; i < graph.voxels; ++i) {
-        const size_t v = static_cast<size_t>(i);
-        x[v] += p[v] * a;
-        r[v] += q[v] * -a;
-      }
-      z = quadratic.Precondition(r);
+      step = Sum(std::move(step), p, rz / along);
+      r = Sum(std::move(r), held.Without(q), -rz / along);
+      z = held.Without(quadratic.Precondition(r));
       const double next = Product(r, z);
-#pragma omp parallel for schedule(static)
-      for (int64_t i = 0; i < graph.voxels; ++i) {
-        const size_t v = static_cast<size_t>(i);
-        p[v] = z[v] + p[v] * (next / rz);
-      }
+      p = Sum(z, p, next / rz);
       rz = next;
     }
+    x = StepWithin(bounds, quadratic, x, descent, step);
   }
   return x;
 }
@@ -109,13 +159,23 @@ std::vector<Vec3f> ViewScale(const Appearance& appearance, const std::vector<Vec
   std::vector<Vec3f> scale(color.size());
   for (size_t v = 0; v < color.size(); ++v)
     for (int c = 0; c < 3; ++c) {
-      const double before =
-          0.5 + kSh0 * double{appearance.sh[static_cast<int64_t>(v) * appearance.stride() +
-                                            c * appearance.basis]};
-      scale[v][c] = static_cast<float>(
-          std::clamp((before + color[v][c]) / std::max(before, kDark), 0.0, 1.0));
+      const double before = std::max(ColorBefore(appearance, v, c), kDark);
+      scale[v][c] = static_cast<float>(std::clamp(1 + color[v][c] / before, 0.0, 1.0));
     }
   return scale;
+}
+
+ResidualBounds BoundsOfColors(const Appearance& appearance) {
+  ResidualBounds bounds;
+  const size_t voxels = static_cast<size_t>(appearance.sh.size() / appearance.stride());
+  bounds.least.resize(voxels), bounds.most.resize(voxels);
+  for (size_t v = 0; v < voxels; ++v)
+    for (int c = 0; c < 3; ++c) {
+      const double color = ColorBefore(appearance, v, c);
+      bounds.least[v][c] = std::min(0.0, -color);
+      bounds.most[v][c] = std::max(0.0, 1 - color);
+    }
+  return bounds;
 }
 
 void AddResidual(const VoxelResidual& residual, Appearance* appearance) {

@@ -15,13 +15,15 @@
 // that know nothing at 0. Of splats W_rv is w_v (see EQ(splat-composite)), and neighbours are
 // the nearest, see GraphOf.
 //
-// The clamp of a sample's colour is not part of E. A constant added at a voxel changes no slope
+// The clamp of a sample's colour at black is not part of E; where x keeps colours from 0 to 1,
+// see BoundsOfColors, it has nothing to do. A constant added at a voxel changes no slope
 // of the map of coefficients there: EQ(liprf-bound) holds for network and residual as for the
 // network. That of a neighbour may be another: the bound says nothing of two positions.
 //
 // E is convex. It is minimised by quadratics that touch it from above (weights p k /
 // sqrt(...)), each by conjugate gradients; the preconditioner adds the diagonals of the cubes
-// of 2 to 64 voxels, so that places far from all rays are reached in few steps.
+// of 2 to 64 voxels, so that places far from all rays are reached in few steps. Bounds are kept
+// by projection: what lies at one, and would leave, is held for a quadratic.
 #pragma once
 
 #include <cstdint>
@@ -46,14 +48,23 @@ double ResidualEnergy(const VoxelGraph& graph, const ResidualRays& rays,
                       const ResidualOptions& options, const std::vector<Vec3d>& x,
                       std::vector<Vec3d>* gradient);
 
+// Of x, each [voxels]; both empty for none.
+struct ResidualBounds {
+  std::vector<Vec3d> least, most;
+};
+
+// For colours that are added to an appearance: its own stay in [0, 1], or where they are.
+ResidualBounds BoundsOfColors(const Appearance& appearance);
+
 // [voxels]. The same for any number of threads. `start`: [voxels], or empty for 0.
 std::vector<Vec3d> FitResidual(const VoxelGraph& graph, const ResidualRays& rays,
-                               const ResidualOptions& options, std::vector<Vec3d> start = {},
+                               const ResidualOptions& options, const ResidualBounds& bounds,
+                               std::vector<Vec3d> start = {},
                                const ProgressFunction& progress = nullptr);
 
 // A residual as it is applied: to a voxel's coefficients s of channel c
 //
-// EQ(view-scale): s_0 += x_c / Gamma_0, s_k *= rho_c for k > 0, rho_c = clamp((a + x_c) /
+// EQ(view-scale): s_0 += x_c / Gamma_0, s_k *= rho_c for k > 0, rho_c = clamp(1 + x_c /
 // max(a, 0.02), 0, 1), a = 1/2 + Gamma_0 s_0 the colour before. What changes with the view
 // keeps its proportion to a colour that is darkened, as under less light, and never grows: rho
 // <= 1 keeps EQ(liprf-bound).

@@ -6,7 +6,7 @@
 // OUT is the folder of a run on `regrade synth`'s still life, STYLE the style that `regrade
 // retouch` made of its view number EDITED, graded as `--grade GRADE` does; the style was
 // rendered. The truth is the grade of the unedited renders. The ceiling is the least squares of
-// all voxels' coefficients to all true views, by conjugate gradients.
+// all voxels' or splats' coefficients to all true views, by conjugate gradients.
 #include <cstdio>
 #include <cstdlib>
 #include <filesystem>
@@ -14,8 +14,8 @@
 #include <vector>
 
 #include "kernels/base/error.h"
-#include "kernels/field/cpu/render_view.h"
 #include "kernels/field/pad_sh_basis.h"
+#include "kernels/render/field_renderer.h"
 #include "pipeline/capture/working_views.h"
 #include "pipeline/fields/field_file.h"
 #include "pipeline/fields/network_file.h"
@@ -30,9 +30,8 @@ namespace {
 // Pictures of a field from all cameras.
 std::vector<Image> Renders(const RadianceField& field, const std::vector<Camera>& cameras) {
   std::vector<Image> pictures;
-  const FastGrid grid = MakeFastGrid(field);
-  for (const Camera& camera : cameras)
-    pictures.push_back(RenderView(grid, camera, field.march).color);
+  const FieldRenderer renderer(field, Backend::kCpu);
+  for (const Camera& camera : cameras) pictures.push_back(renderer.Render(camera).color);
   return pictures;
 }
 

@@ -244,7 +244,7 @@ TEST_P(SplatStyleOf, AResidualShowsAnEdit) {
     AddResidualRays(scene.field, scene.cameras[v], scene.missing[v], 1 << 20, 0, &rays);
   const auto fit = [&](int threads) {
     const Threads some(threads);
-    return FitResidual(graph, rays, {});
+    return FitResidual(graph, rays, {}, {});
   };
   const std::vector<Vec3d> x = fit(1), again = fit(5);
   for (size_t v = 0; v < x.size(); ++v) ASSERT_TRUE(x[v] == again[v]) << v;

@@ -113,7 +113,7 @@ TEST(VoxelResidual, TheFitEndsWhereTheGradientIsZero) {
   const ResidualRays rays = SomeRays(graph, 150, graph.voxels, 7);
   ResidualOptions options;
   options.turns = 60, options.steps = 100;
-  const std::vector<Vec3d> x = FitResidual(graph, rays, options);
+  const std::vector<Vec3d> x = FitResidual(graph, rays, options, {});
   const auto norm = [&](const std::vector<Vec3d>& at) {
     std::vector<Vec3d> gradient(at.size());
     ResidualEnergy(graph, rays, options, at, &gradient);
@@ -130,9 +130,38 @@ TEST(VoxelResidual, TheFitEndsWhereTheGradientIsZero) {
     return ResidualEnergy(graph, rays, options, at, nullptr);
   };
   const double least = energy(x), nothing = energy(std::vector<Vec3d>(x.size())),
-               quick = energy(FitResidual(graph, rays, few));
+               quick = energy(FitResidual(graph, rays, few, {}));
   EXPECT_LT(least, quick + 1e-9);
   EXPECT_LE(quick - least, 0.05 * (nothing - least));
+}
+
+TEST(VoxelResidual, ColorsStayBetweenBlackAndWhiteAndTheRestIsAtItsLeast) {
+  const RadianceField field = Block(6, 3);
+  const VoxelGraph graph = GraphOf(field);
+  ResidualRays rays = SomeRays(graph, 150, graph.voxels, 7);
+  for (Vec3f& missing : rays.missing) missing = missing * 4.0f;
+  const ResidualOptions options{.turns = 60, .steps = 100};
+  const ResidualBounds bounds = BoundsOfColors(field.appearance);
+  const std::vector<Vec3d> x = FitResidual(graph, rays, options, bounds);
+  std::vector<Vec3d> gradient(x.size()), at_start(x.size());
+  ResidualEnergy(graph, rays, options, x, &gradient);
+  ResidualEnergy(graph, rays, options, std::vector<Vec3d>(x.size()), &at_start);
+  double squared = 0, of_start = 0;
+  int least = 0, most = 0;
+  for (size_t v = 0; v < x.size(); ++v)
+    for (int c = 0; c < 3; ++c) {
+      ASSERT_GE(x[v][c], bounds.least[v][c]);
+      ASSERT_LE(x[v][c], bounds.most[v][c]);
+      double g = gradient[v][c];
+      if (x[v][c] == bounds.least[v][c]) g = std::min(g, 0.0), ++least;
+      if (x[v][c] == bounds.most[v][c]) g = std::max(g, 0.0), ++most;
+      squared += g * g, of_start += at_start[v][c] * at_start[v][c];
+    }
+  EXPECT_GT(least, 20);
+  EXPECT_GT(most, 20);
+  const double left = std::sqrt(squared / of_start);
+  EXPECT_LE(left, testing::RecordBound("gradient left of the start's, with bounds",
+                                       testing::Computed::kDouble, left, 1e-3));
 }
 
 TEST(VoxelResidual, UnseenPlacesFollowNeighboursOfLikeColour) {
@@ -150,7 +179,7 @@ TEST(VoxelResidual, UnseenPlacesFollowNeighboursOfLikeColour) {
         rays.missing.push_back({missing, 0, 0});
         rays.share.push_back(1);
       }
-  const std::vector<Vec3d> x = FitResidual(graph, rays, ResidualOptions());
+  const std::vector<Vec3d> x = FitResidual(graph, rays, {}, {});
   const auto red = [&](int at) { return x[static_cast<size_t>(voxel(at, n / 2, n / 2))].x; };
   EXPECT_NEAR(red(n - 1), 0.2, 0.02);
   EXPECT_NEAR(red(dark), 0.2, 0.02) << "unseen, of like colour";
@@ -163,9 +192,9 @@ TEST(VoxelResidual, DoesNotDependOnTheThreads) {
   const ResidualRays rays = SomeRays(graph, 300, graph.voxels, 9);
   const int threads = omp_get_max_threads();
   omp_set_num_threads(1);
-  const std::vector<Vec3d> one = FitResidual(graph, rays, ResidualOptions());
+  const std::vector<Vec3d> one = FitResidual(graph, rays, {}, {});
   omp_set_num_threads(3);
-  const std::vector<Vec3d> three = FitResidual(graph, rays, ResidualOptions());
+  const std::vector<Vec3d> three = FitResidual(graph, rays, {}, {});
   omp_set_num_threads(threads);
   for (size_t v = 0; v < one.size(); ++v) ASSERT_TRUE(one[v] == three[v]) << v;
 }
@@ -225,6 +254,9 @@ TEST(VoxelResidual, WhatChangesWithTheViewKeepsItsProportionAndNeverGrows) {
   EXPECT_NEAR(appearance.sh[1], 0.05, 1e-6);
   EXPECT_NEAR(appearance.sh[7], 0.1, 1e-6);
   EXPECT_EQ(appearance.sh[11], 0);
+  // What is darker than black, and is not edited, keeps all of it.
+  appearance.sh[0] = static_cast<float>(-0.6 / kSh0);
+  EXPECT_EQ(ViewScale(appearance, {{0, 0, 0}})[0].x, 1);
 }
 
 }  // namespace
