@@ -89,12 +89,12 @@ class ResidualFit {
                       context_->settings.run.seed + static_cast<uint64_t>(i), &rays);
     }
     const ProgressFunction fitting = parts.Next(1);
-    const ResidualBounds bounds = BoundsWith(so_far, start);
     if (rays.num_rays() == 0) return std::vector<Vec3d>(static_cast<size_t>(graph_.voxels));
     if (!start.empty()) {
       const std::vector<Vec3d> seen = SumAlongRays(rays, start);
       for (size_t r = 0; r < seen.size(); ++r) rays.missing[r] += seen[r].Cast<float>();
     }
+    const ResidualBounds bounds = BoundsWith(so_far, start);
     return FitResidual(graph_, rays, options, bounds, std::move(start), fitting);
   }
 
