@@ -97,7 +97,7 @@ void* DeviceAllocate(int64_t bytes, const char* what) {
                   Mebibytes(static_cast<int64_t>(free_bytes)) + " of " +
                   Mebibytes(static_cast<int64_t>(total_bytes)) +
                   " free): " + cudaGetErrorString(status),
-              "GPU", "lower --fit-resolutions, use --device cpu, or close other GPU programs");
+              "GPU", "use a coarser --preset, --device cpu, or close other GPU programs");
 }
 
 void DeviceFree(void* pointer) noexcept {

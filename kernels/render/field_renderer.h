@@ -2,6 +2,7 @@
 #pragma once
 
 #include <memory>
+#include <utility>
 
 #include "kernels/device/backend.h"
 #include "kernels/field/radiance_field.h"
@@ -12,9 +13,12 @@ namespace regrade {
 
 class FieldRenderer {
  public:
-  // Copies what it needs. Throws Error(kResources) where the GPU's memory is too small.
-  FieldRenderer(const RadianceField& field, Backend backend)
-      : renderer_(RenderKindOf(*field.geometry).make_renderer(field, backend)) {}
+  // Takes the field over: move one that nobody else needs. Throws Error(kResources) where the
+  // GPU's memory is too small.
+  FieldRenderer(RadianceField field, Backend backend) {
+    const RenderKind& kind = RenderKindOf(*field.geometry);
+    renderer_ = kind.make_renderer(std::move(field), backend);
+  }
 
   // In single precision, every sample. A field of splats has no picture through a lens:
   // its cameras are pinholes.

@@ -12,7 +12,7 @@
 namespace regrade {
 
 struct RenderKind {
-  std::unique_ptr<KindRenderer> (*make_renderer)(const RadianceField& field, Backend backend);
+  std::unique_ptr<KindRenderer> (*make_renderer)(RadianceField field, Backend backend);
   // See MakeRayWeigher, RayDepths and OpticalDepths.
   std::unique_ptr<RayWeigher> (*make_weigher)(const Geometry& geometry, float near_clip,
                                               const MarchOptions& march, int64_t kept_bytes);

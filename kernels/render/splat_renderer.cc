@@ -16,8 +16,7 @@ namespace {
 // trade for.
 class SplatRenderer : public KindRenderer {
  public:
-  explicit SplatRenderer(const RadianceField& field)
-      : field_(field), options_(SplatOptionsOf(field_)) {}
+  explicit SplatRenderer(const RadianceField& field) : options_(SplatOptionsOf(field)) {}
 
  protected:
   // Splats are in the world, whose rays need no device coordinates.
@@ -27,13 +26,13 @@ class SplatRenderer : public KindRenderer {
     return camera;
   }
 
-  RadianceField field_;  // on a device without colours
   SplatOptions options_;
 };
 
 class CpuSplatRenderer : public SplatRenderer {
  public:
-  using SplatRenderer::SplatRenderer;
+  explicit CpuSplatRenderer(RadianceField field)
+      : SplatRenderer(field), field_(std::move(field)) {}
 
   RenderedView Render(const Camera& camera) const override {
     SplatFrame frame = FrameOf(camera);
@@ -67,6 +66,7 @@ class CpuSplatRenderer : public SplatRenderer {
     kept_ = std::move(frame);
   }
 
+  RadianceField field_;
   mutable std::mutex mutex_;
   mutable SplatFrame kept_;  // the last one, for its memory: fresh pages take long
 };
@@ -75,7 +75,6 @@ class CudaSplatRenderer : public SplatRenderer {
  public:
   explicit CudaSplatRenderer(const RadianceField& field) : SplatRenderer(field) {
     device_.Upload(SplatsOf(field));
-    field_ = {};
   }
 
   RenderedView Render(const Camera& camera) const override {
@@ -94,9 +93,9 @@ class CudaSplatRenderer : public SplatRenderer {
 
 }  // namespace
 
-std::unique_ptr<KindRenderer> MakeSplatRenderer(const RadianceField& field, Backend backend) {
+std::unique_ptr<KindRenderer> MakeSplatRenderer(RadianceField field, Backend backend) {
   if (backend == Backend::kCuda) return std::make_unique<CudaSplatRenderer>(field);
-  return std::make_unique<CpuSplatRenderer>(field);
+  return std::make_unique<CpuSplatRenderer>(std::move(field));
 }
 
 }  // namespace regrade

@@ -9,6 +9,6 @@
 
 namespace regrade {
 
-std::unique_ptr<KindRenderer> MakeSplatRenderer(const RadianceField& field, Backend backend);
+std::unique_ptr<KindRenderer> MakeSplatRenderer(RadianceField field, Backend backend);
 
 }  // namespace regrade

@@ -43,7 +43,7 @@ class VoxelRenderer : public KindRenderer {
 
 }  // namespace
 
-std::unique_ptr<KindRenderer> MakeVoxelRenderer(const RadianceField& field, Backend backend) {
+std::unique_ptr<KindRenderer> MakeVoxelRenderer(RadianceField field, Backend backend) {
   return std::make_unique<VoxelRenderer>(field, backend);
 }
 

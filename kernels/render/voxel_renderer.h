@@ -9,6 +9,6 @@
 
 namespace regrade {
 
-std::unique_ptr<KindRenderer> MakeVoxelRenderer(const RadianceField& field, Backend backend);
+std::unique_ptr<KindRenderer> MakeVoxelRenderer(RadianceField field, Backend backend);
 
 }  // namespace regrade

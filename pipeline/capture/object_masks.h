@@ -37,7 +37,8 @@ struct MaskOptions {
          {.help = "fraction of the photos' votes at which a voxel has object weight 0.5; "
                   "lower values extend the object and rely on fewer masks",
           .min = 0.01,
-          .max = 0.99});
+          .max = 0.99,
+          .constant = true});
     bind("mask-edge", edge,
          {.unit = "fraction of votes",
           .help = "half the width of the object's soft edge; 0 makes a hard edge",

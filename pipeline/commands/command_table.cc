@@ -49,9 +49,9 @@ const std::vector<Command>& AllCommands() {
       {"study", "A B [C ...] --out FILE.html [OPTIONS] | --analyse ANSWERS.json ...",
        "makes a page that asks people which film they prefer, and analyses their answers",
        RunStudy},
-      {"tradeoff", "PHOTOS|CAPTURE|DIR --out DIR [--style PICTURE] [OPTIONS] | --predict DIR",
+      {"tradeoff", "PHOTOS|CAPTURE|DIR --out DIR [--style PICTURE] [OPTIONS]",
        "measures on this machine how each parameter trades time for accuracy", RunTradeoff,
-       "out preset style parameters presets repeats budget with-poses predict costs dry-run "
+       "out preset style parameters presets repeats budget with-poses dry-run "
        "verbose"},
       {"synth", "OUT [OPTIONS]", "writes a synthetic capture with its exact ground truth",
        RunSynth},

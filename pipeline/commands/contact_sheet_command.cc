@@ -69,8 +69,8 @@ std::vector<SheetRow> RowsOfStyles(const WorkingViews& views, const std::vector<
   const StoredField seen = SeenPart(std::move(geometry), folder + "/field.npz", cameras);
   for (const std::string& name : names) {
     const std::string style = StyleFolder(folder, name);
-    const StoredField styled = StyledFieldOf(seen, style, StrengthOf(style));
-    const FieldRenderer renderer(styled.field, Backend::kCpu);
+    StoredField styled = StyledFieldOf(seen, style, StrengthOf(style));
+    const FieldRenderer renderer(std::move(styled.field), Backend::kCpu);
     for (size_t k = 0; k < rows.size(); ++k)
       rows[k].push_back({Clipped(renderer.Render(cameras[k]).color), name});
   }

@@ -1,16 +1,10 @@
 // regrade evaluate: metrics of a run, or of frames or splats of any program.
 #include <algorithm>
-#include <optional>
 
-#include "evaluate/pair_network.h"
 #include "kernels/base/error.h"
 #include "pipeline/commands/continue_command.h"
 #include "pipeline/commands/evaluate_frames.h"
 #include "pipeline/commands/evaluate_splats.h"
-#include "pipeline/commands/paired_benchmark.h"
-#include "pipeline/files/json_file.h"
-#include "pipeline/stages/network_probe.h"
-#include "pipeline/workspace/workspace.h"
 
 namespace regrade {
 namespace {
@@ -45,41 +39,6 @@ Arguments SpreadLists(const Arguments& words) {
   return spread;
 }
 
-// Pictures of a 2D method against their ground truth; `words` are those of the command line.
-void EvaluatePairs(const FramesOptions& frames, const ConsistencyOptions& options,
-                   const Arguments& words, Console* console) {
-  for (const auto& [flag, value] : {std::pair{"--reference", frames.reference},
-                                    {"--target", frames.target},
-                                    {"--style", frames.style},
-                                    {"--poses", frames.poses},
-                                    {"--depth", frames.depth},
-                                    {"--require", frames.require},
-                                    {"--junit", frames.junit},
-                                    {"--edges", options.edges}})
-    if (!value.empty())
-      throw UsageError("pictures of PST50 are compared with its ground truth only", flag,
-                       "leave it out");
-  if (frames.frames.size() > 1 || !frames.label.empty())
-    throw UsageError("pictures of PST50 are of one method", "--frames and --label",
-                     "give one folder without a label");
-  ProbeEvaluationNetworks(options);
-  std::optional<Workspace> workspace;
-  if (!frames.out.empty()) workspace.emplace(frames.out);
-  console->BeginStage("evaluate");
-  const std::vector<PairedRow> rows =
-      MeasurePairedFolder({frames.pst50, frames.frames[0], options.controls},
-                          PerceptualDistance(options.lpips), console->StageProgress());
-  console->EndStage();
-  JsonValue report = PairedJson(rows);
-  console->Event("paired", report);
-  JsonValue command = JsonValue::Array{"regrade", "evaluate"};
-  for (const std::string& word : words) command.Append(word);
-  report["regrade"] = REGRADE_VERSION;
-  report["command"] = std::move(command);
-  if (workspace) WriteJsonFile(workspace->Path("report.json"), report);
-  console->Lines(FormatPairedTable(rows, frames.table));
-}
-
 }  // namespace
 
 void RunEvaluate(const Command& command, const Arguments& words, Console* console) {
@@ -111,7 +70,6 @@ void RunEvaluate(const Command& command, const Arguments& words, Console* consol
   for (const char* flag : {"cameras", "up", "background", "size"})
     if (options.Given(flag))
       throw UsageError("belongs to --splats", std::string("--") + flag, "leave it out");
-  if (!frames.pst50.empty()) return EvaluatePairs(frames, consistency, words, console);
   EvaluateFrames(frames, consistency, words, console);
 }
 

@@ -14,8 +14,8 @@ namespace regrade {
 
 struct FramesOptions {
   std::vector<std::string> frames, label;
-  std::string reference, target, style, poses, depth, pst50, out, protocol, table = "text",
-                                                                            require, junit;
+  std::string reference, target, style, poses, depth, out, protocol, table = "text", require,
+                                                                     junit;
 
   template <typename Bind>
   void Describe(Bind& bind) {
@@ -42,10 +42,6 @@ struct FramesOptions {
     bind("depth", depth,
          {.help = "of --mode geometry: folder with a depth map of each frame of --reference, "
                   ".npy of height x width, along the optical axis in the unit of --poses"});
-    bind(
-        "pst50", pst50,
-        {.help = "folder of the 2D benchmark PST50: --frames has a method's picture of each of "
-                 "its contents, of the same names, which are compared with paired_gt"});
     // Stands for other options, which ExpandProtocol() puts in its place.
     bind("protocol", protocol,
          {.help = "a published protocol by name, also for runs: sets --mode, --gaps and "

@@ -25,7 +25,6 @@ void CheckSplats(const SplatsOptions& splats, const FramesOptions& frames) {
     throw UsageError("styled splats are compared with those before styling", "--splats",
                      "add --reference FILE");
   for (const auto& [flag, given] : {std::pair{"--frames", !frames.frames.empty()},
-                                    {"--pst50", !frames.pst50.empty()},
                                     {"--poses", !frames.poses.empty()},
                                     {"--depth", !frames.depth.empty()}})
     if (given)

@@ -15,6 +15,7 @@
 #include "pipeline/images/image_file.h"
 #include "pipeline/images/video_writer.h"
 #include "pipeline/program/device_choice.h"
+#include "pipeline/run/run_file.h"
 #include "pipeline/run/run_settings.h"
 #include "pipeline/stages/film_frames.h"
 #include "pipeline/stages/mixed_film.h"
@@ -80,9 +81,11 @@ struct MixCameras {
 };
 
 MixCameras CamerasOf(const std::string& folder, const StoredField& stored,
-                     const SceneOptions& scene, const RenderOptions& render) {
+                     const RenderOptions& render) {
+  const JsonValue run = ReadRunFile(folder + "/run.json").options;
   const WorkingViews views =
-      ReadWorkingViews(folder + "/poses", scene.photo_size, 0).InField(stored);
+      ReadWorkingViews(folder + "/poses", static_cast<int>(run.At("photo-size").AsInt()), 0)
+          .InField(stored);
   const std::vector<Camera> film = MakeFilmPath(views, render, &stored.field).film;
   return {render.path.path == "views" ? views.Cameras() : film, film};
 }
@@ -121,21 +124,18 @@ void WriteMix(const std::string& out, const RadianceField& source,
 
 void RunMix(const Command& command, const Arguments& arguments, Console* console) {
   MixOptions settings;
-  SceneOptions scene;
   RenderOptions render;
   ProgramOptions program;
   OptionSet options;
   options.Add("Mix", &settings);
-  options.Add("Scene", &scene);
   options.Add("Render", &render);
   options.Add("Program", &program);
   constexpr size_t kMostWords = 17;  // the folder and 16 styles
-  const auto prepared =
-      Prepare(command, arguments,
-              {.most_words = kMostWords,
-               .continues_run = true,
-               .taken = {"photo-size", "fps", "path", "film-seconds", "film-size"}},
-              &options);
+  const auto prepared = Prepare(command, arguments,
+                                {.most_words = kMostWords,
+                                 .continues_run = true,
+                                 .taken = {"fps", "path", "film-seconds", "film-size"}},
+                                &options);
   if (!prepared) return;
   const Arguments& words = prepared->words;
   const std::string& folder = words[0];
@@ -155,7 +155,7 @@ void RunMix(const Command& command, const Arguments& arguments, Console* console
   CheckResults(folder, own);
   StoredField stored = ReadFieldFile(folder + "/field.npz");
   const Backend backend = ChooseBackend(settings.device, false);
-  const MixCameras cameras = CamerasOf(folder, stored, scene, render);
+  const MixCameras cameras = CamerasOf(folder, stored, render);
   if (settings.dry_run) {
     console->Info(Concat(Counted(std::ssize(cameras.film), "frame"), " of ",
                          cameras.film[0].width, "x", cameras.film[0].height, " along ",

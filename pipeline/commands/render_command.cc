@@ -101,9 +101,9 @@ void RenderStills(const std::string& folder, const std::string& name,
     wanted.push_back(PhotoNamed(views.capture(), still));
     cameras.push_back(views.CameraOf(wanted.back()));
   }
-  const StoredField stored = StyledFieldOf(SeenPart(std::move(geometry), field, cameras),
-                                           style.folder(), settings.style.strength);
-  const FieldRenderer renderer(stored.field,
+  StoredField stored = StyledFieldOf(SeenPart(std::move(geometry), field, cameras),
+                                     style.folder(), settings.style.strength);
+  const FieldRenderer renderer(std::move(stored.field),
                                ChooseBackend(settings.run.device, settings.run.reproducible));
   for (const int i : wanted) {
     Image picture = renderer.Render(views.CameraOf(i)).color;

@@ -12,6 +12,8 @@
 #include "kernels/field/cpu/rays.h"
 #include "pipeline/capture/capture_store.h"
 #include "pipeline/capture/ingest_photos.h"
+#include "pipeline/capture/scene_profile.h"
+#include "pipeline/capture/working_views.h"
 #include "pipeline/commands/command.h"
 #include "pipeline/commands/probe_styles.h"
 #include "pipeline/files/atomic_file.h"
@@ -25,7 +27,6 @@
 #include "pipeline/stages/scene_source.h"
 #include "pipeline/study/cost_table.h"
 #include "pipeline/study/duration_estimate.h"
-#include "pipeline/study/prediction.h"
 #include "pipeline/study/variant_runner.h"
 #include "pipeline/workspace/metrics_json.h"
 #include "pipeline/workspace/style_folders.h"
@@ -36,7 +37,7 @@ namespace {
 namespace fs = std::filesystem;
 
 struct TradeoffOptions {
-  std::string parameters, presets = "draft,standard", predict, costs;
+  std::string parameters, presets = "draft,standard";
   int repeats = 3;
   double budget = 0;
   bool with_poses = false;
@@ -63,9 +64,6 @@ struct TradeoffOptions {
           .max = 1e6});
     bind("with-poses", with_poses,
          {.help = "also measure COLMAP's parameters, if photos without poses are given"});
-    bind("predict", predict,
-         {.help = "folder of a run: prints its time predicted from --costs and its real time"});
-    bind("costs", costs, {.help = "the tradeoff.json to predict from"});
   }
 };
 
@@ -137,11 +135,9 @@ void WriteResults(const RunContext& base, const TradeoffOptions& tradeoff,
                   const std::string& folder, const std::vector<Variant>& variants,
                   const MeasurementStore& store, const std::string& base_name) {
   const std::vector<CostRow> rows = CostTable(variants, store.all(), base_name);
-  const Capture capture = ReadCapture(base.workspace->Path("poses"));
   JsonValue::Array costs, measured;
   for (const CostRow& row : rows) costs.push_back(MetricsToJson(row));
   for (const Measurement& m : store.all()) measured.push_back(ToJson(m));
-  const std::vector<CostTerm> terms = LearnCosts(base, capture, variants, store.all());
   WriteJsonFile(folder + "/tradeoff.json",
                 JsonValue::Object{{"schema", kTradeoffSchema},
                                   {"regrade", REGRADE_VERSION},
@@ -150,7 +146,6 @@ void WriteResults(const RunContext& base, const TradeoffOptions& tradeoff,
                                   {"threads", omp_get_max_threads()},
                                   {"instructions", FastRays().name},
                                   {"costs", std::move(costs)},
-                                  {"unit_costs", ToJson(terms)},
                                   {"measurements", std::move(measured)}});
   WriteFileAtomically(folder + "/tradeoff.csv", CostTableCsv(rows));
   RunReport report;
@@ -171,6 +166,27 @@ std::string StateOf(const Workspace& workspace, const char* stage) {
   const auto record = workspace.Find(stage);
   if (!record) return "";
   return DumpJson(record->inputs, -1) + Format(" %.17g", record->seconds);
+}
+
+// Of a fit on the CPU: its photos and their pixels, at working size.
+FitPlace PlaceOfPhotos(const RunSettings& settings, const Capture& capture) {
+  const std::vector<bool> held_out = HeldOutViews(capture, settings.run.holdout);
+  FitPlace place;
+  for (size_t i = 0; i < capture.views.size(); ++i) {
+    if (held_out[i]) continue;
+    const Camera camera =
+        WorkingCamera(capture.views[i].camera, settings.scene.photo_size, {}, {});
+    place.pixels += int64_t{camera.width} * camera.height, ++place.photos;
+  }
+  return place;
+}
+
+// Before any photo is read, see ExpectedPixels.
+FitPlace ExpectedPlace(const RunSettings& settings, int64_t photos) {
+  FitPlace place;
+  place.pixels = ExpectedPixels(photos, settings.scene.photo_size, settings.run.holdout);
+  place.photos = photos;
+  return place;
 }
 
 // The time of measurements, and of the base run where there was none.
@@ -214,7 +230,7 @@ void MeasureAll(RunContext* base, const TradeoffOptions& tradeoff, const std::st
   const Capture capture = ReadCapture(base->workspace->Path("poses"));
   DurationEstimate estimate(
       base->settings, store->all(),
-      [&capture](const RunSettings& settings) { return PlaceOf(settings, capture); });
+      [&capture](const RunSettings& settings) { return PlaceOfPhotos(settings, capture); });
   VariantRunner runner(base, folder + "/work");
   for (size_t i = 0; i < jobs.size(); ++i) {
     double left = 0;
@@ -249,56 +265,10 @@ void CheckOptions(const RunSettings& settings, const TradeoffOptions& tradeoff) 
     throw UsageError("costs are measured for whole scenes", "--masks", "omit it");
   if (settings.run.device == "cuda")
     throw UsageError("costs are measured on the CPU only", "--device", "use --device cpu");
-  if (!settings.start.config.empty() || !settings.start.restart_from.empty())
-    throw UsageError("not supported by tradeoff", "--config and --restart-from",
-                     "omit them; remove the folder to start over");
+  if (!settings.start.restart_from.empty())
+    throw UsageError("not supported by tradeoff", "--restart-from",
+                     "omit it; remove the folder to start over");
   for (const std::string& preset : Words(tradeoff.presets)) PresetOptions(preset);
-}
-
-void PrintPrediction(const TradeoffOptions& tradeoff, Console* console) {
-  RequireValue(tradeoff.costs, "--costs", "name a tradeoff.json from `regrade tradeoff`");
-  const std::vector<CostTerm> costs =
-      CostsFromJson(ReadJsonFile(tradeoff.costs), tradeoff.costs);
-  const std::string& folder = tradeoff.predict;
-  if (!Workspace::Exists(folder))
-    throw InputError("this is not the folder of a run", folder, "make one with `regrade run`");
-  RunContext run;
-  run.settings.Bind(&run.options);
-  const std::string style = StyleFolder(folder, ChosenStyle(folder, ""));
-  // Nothing of it is run.
-  ResolveSettings({.run_json = style + "/run.json",
-                   .accept_outside = [](const OutsideOptions&) { return true; }},
-                  &run.options);
-  Workspace workspace(folder), of_style(style);
-  const Capture capture = ReadCapture(workspace.Path("poses"));
-  console->Lines(Format("%-12s %12s %12s %7s %12s %12s %7s", "stage", "predicted s", "took s",
-                        "ratio", "predicted", "CPU s", "ratio"));
-  JsonValue::Array rows;
-  StageTime all{"all", 0, 0}, took{"all", 0, 0};
-  const auto print = [&](const StageTime& predicted, const StageTime& measured) {
-    const double wall = measured.seconds > 0 ? predicted.seconds / measured.seconds : 0,
-                 cpu = measured.cpu_seconds > 0 ? predicted.cpu_seconds / measured.cpu_seconds
-                                                : 0;
-    console->Lines(Format("%-12s %12.1f %12.1f %7.2f %12.1f %12.1f %7.2f",
-                          predicted.stage.c_str(), predicted.seconds, measured.seconds, wall,
-                          predicted.cpu_seconds, measured.cpu_seconds, cpu));
-    rows.push_back(JsonValue::Object{{"stage", predicted.stage},
-                                     {"predicted_seconds", predicted.seconds},
-                                     {"seconds", measured.seconds},
-                                     {"predicted_cpu_seconds", predicted.cpu_seconds},
-                                     {"cpu_seconds", measured.cpu_seconds}});
-  };
-  for (const StageTime& predicted : Predict(costs, run.settings, capture)) {
-    const auto record =
-        (IsOfScene(predicted.stage) ? workspace : of_style).Find(predicted.stage);
-    if (!record) continue;
-    const StageTime measured{predicted.stage, record->seconds, record->cpu_seconds.value_or(0)};
-    print(predicted, measured);
-    all.seconds += predicted.seconds, all.cpu_seconds += predicted.cpu_seconds;
-    took.seconds += measured.seconds, took.cpu_seconds += measured.cpu_seconds;
-  }
-  print(all, took);
-  console->Event("prediction", JsonValue::Object{{"stages", std::move(rows)}});
 }
 
 }  // namespace
@@ -315,14 +285,9 @@ void RunTradeoff(const Command& command, const Arguments& arguments, Console* co
   flags.Add("Tradeoff", &tradeoff);
   // Measuring the standard preset takes hours.
   const auto prepared = Prepare(command, arguments,
-                                {.least_words = 0, .most_words = 1, .preset = "draft"}, &flags);
+                                {.least_words = 1, .most_words = 1, .preset = "draft"}, &flags);
   if (!prepared) return;
   const Arguments& words = prepared->words;
-  if (!tradeoff.predict.empty()) {
-    CheckWords(command, words, 0, 0);
-    return PrintPrediction(tradeoff, console);
-  }
-  CheckWords(command, words, 1, 1);
   CheckOptions(settings, tradeoff);
   CheckTogether(settings);
   base.source = AbsolutePath(words[0]);

@@ -3,27 +3,46 @@
 #include <algorithm>
 #include <cmath>
 
-#include "kernels/base/error.h"
 #include "kernels/splats/splat_field.h"
-#include "pipeline/fields/colored_splat.h"
 
 namespace regrade {
 
-void MoveSplats(const Similarity& target_from_source, Splats* splats) {
-  const SplatTurn turn(target_from_source.rotation);
-  const double log_scale = std::log(target_from_source.scale);
+SplatMove::SplatMove(const Similarity& target_from_source)
+    : move_(target_from_source),
+      log_scale_(std::log(target_from_source.scale)),
+      turn_(target_from_source.rotation) {}
+
+void SplatMove::Apply(int basis, ColoredSplat* record) const {
+  const Vec3d mean = move_ * record->splat.mean.Cast<double>();
+  turn_.Apply(basis, record);
+  record->splat.mean = mean.Cast<float>();
+  Vec3f& scale = record->splat.log_scale;
+  scale = (scale.Cast<double>() + Vec3d{log_scale_, log_scale_, log_scale_}).Cast<float>();
+}
+
+SplatMove ToWorld(const StoredField& stored) {
+  const Similarity& s = stored.field_from_world;
+  const Mat3d back = s.rotation.Transposed();
+  return SplatMove({1 / s.scale, back, -(back * s.translation) / s.scale});
+}
+
+namespace {
+
+void MoveAll(const SplatMove& move, Splats* splats) {
   const int64_t width = 3 * splats->basis;
 #pragma omp parallel for schedule(static)
   for (int64_t i = 0; i < splats->count(); ++i) {
     ColoredSplat record = SplatAt(splats->view(), i);
-    const Vec3d mean = target_from_source * record.splat.mean.Cast<double>();
-    turn.Apply(splats->basis, &record);
-    record.splat.mean = mean.Cast<float>();
-    Vec3f& scale = record.splat.log_scale;
-    scale = (scale.Cast<double>() + Vec3d{log_scale, log_scale, log_scale}).Cast<float>();
+    move.Apply(splats->basis, &record);
     splats->Set(i, record.splat);
     std::copy_n(record.sh, width, splats->sh.data() + i * width);
   }
+}
+
+}  // namespace
+
+void MoveSplats(const Similarity& target_from_source, Splats* splats) {
+  MoveAll(SplatMove(target_from_source), splats);
 }
 
 Splats WorldSplats(const StoredField& stored) {
@@ -32,9 +51,7 @@ Splats WorldSplats(const StoredField& stored) {
   for (int64_t i = 0; i < view.count; ++i) splats.Set(i, view[i]);
   std::copy_n(view.sh, splats.sh.size(), splats.sh.data());
   splats.background = view.background;
-  const Similarity& s = stored.field_from_world;
-  const Mat3d back = s.rotation.Transposed();
-  MoveSplats({1 / s.scale, back, -(back * s.translation) / s.scale}, &splats);
+  MoveAll(ToWorld(stored), &splats);
   return splats;
 }
 
@@ -42,22 +59,6 @@ Mat3d HalfTurnAboutX() {
   Mat3d turn;
   turn(1, 1) = turn(2, 2) = -1;
   return turn;
-}
-
-std::vector<float> ColorsBeforeMove(const Similarity& target_from_source,
-                                    std::span<const float> sh, int basis) {
-  const SplatTurn back(target_from_source.rotation.Transposed());
-  const size_t width = 3 * static_cast<size_t>(basis);
-  REGRADE_CHECK(sh.size() % width == 0);
-  std::vector<float> before(sh.size());
-#pragma omp parallel for schedule(static)
-  for (size_t i = 0; i < sh.size(); i += width) {
-    ColoredSplat record;
-    std::copy_n(sh.begin() + static_cast<long>(i), width, record.sh);
-    back.Apply(basis, &record);
-    std::copy_n(record.sh, width, before.begin() + static_cast<long>(i));
-  }
-  return before;
 }
 
 }  // namespace regrade

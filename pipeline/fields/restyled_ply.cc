@@ -46,8 +46,7 @@ bool IsGaussianPly(const std::filesystem::path& path) {
 }
 
 void WriteRestyled(const std::filesystem::path& path_in, const std::filesystem::path& path_out,
-                   std::span<const float> sh, int basis, const std::string& comment,
-                   const std::vector<bool>& kept) {
+                   const NewColors& colors, const std::string& comment) {
   const std::string where = path_in.string();
   const std::string bytes = ReadWholeFile(where, UINT64_MAX);
   const PlyHeader header = LooksLikePly(bytes) ? ParsePlyHeader(bytes, where) : PlyHeader{};
@@ -56,9 +55,7 @@ void WriteRestyled(const std::filesystem::path& path_in, const std::filesystem::
                      "convert it first (`splat-transform IN OUT.ply`)");
   const GaussianLayout layout = FindGaussians(header, where);
   const PlyElement& element = header.elements[layout.vertex];
-  REGRADE_CHECK(basis >= 1 && sh.size() % (3 * static_cast<size_t>(basis)) == 0);
-  const size_t row_size = 3 * static_cast<size_t>(basis), splats = sh.size() / row_size;
-  REGRADE_CHECK(kept.empty() || kept.size() == splats);
+  REGRADE_CHECK(colors.basis >= 1 && colors.basis <= kMaxBasis);
   const std::vector<Coefficient> order = InOrderOfTheFile(layout);
   for (const Coefficient& c : order)
     if (IsInteger(element.properties[c.property].type))
@@ -76,16 +73,16 @@ void WriteRestyled(const std::filesystem::path& path_in, const std::filesystem::
   replace(header.after_format, header.after_format,
           "comment " + Printable(comment) + header.line_end);
   PlyRows rows(bytes, header, layout.vertex, where);
-  size_t usable = 0;
+  int64_t usable = 0;
   for (uint64_t i = 0; i < element.count; ++i) {
     rows.Next();
     ColoredSplat record = RecordOf(rows, layout);
     if (!CleanRecord(layout.basis, &record)) continue;
-    if (usable++ >= splats) break;
-    if (!kept.empty() && kept[usable - 1]) continue;
-    const std::span<const float> row = sh.subspan((usable - 1) * row_size, row_size);
+    if (usable++ >= colors.count) break;
+    float row[3 * kMaxBasis];
+    if (!colors.of(usable - 1, row)) continue;
     for (const Coefficient& c : order) {
-      const size_t width = static_cast<size_t>(basis);
+      const size_t width = static_cast<size_t>(colors.basis);
       const float value = c.k < width ? row[c.channel * width + c.k] : 0.0f;
       const std::string_view cell = rows.Cell(c.property);
       const size_t begin = static_cast<size_t>(cell.data() - bytes.data());
@@ -93,9 +90,9 @@ void WriteRestyled(const std::filesystem::path& path_in, const std::filesystem::
               PlyCell(value, element.properties[c.property].type, header.encoding));
     }
   }
-  if (usable != splats)
-    throw InputError(Concat("it no longer has the ", splats, " splats that were read"), where,
-                     "has the file been changed? run the same command again");
+  if (usable != colors.count)
+    throw InputError(Concat("it no longer has the ", colors.count, " splats that were read"),
+                     where, "has the file been changed? run the same command again");
   file.Write(bytes.data() + copied, bytes.size() - copied);
   file.Commit();
 }

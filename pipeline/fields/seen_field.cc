@@ -7,7 +7,8 @@ namespace regrade {
 
 StoredField SeenPart(StoredField geometry, const std::string& path,
                      const std::vector<Camera>& cameras) {
-  if (!geometry.field.geometry->splats.on()) return geometry;
+  if (geometry.field.geometry != nullptr && !geometry.field.geometry->splats.on())
+    return geometry;
   geometry = {};
   return ReadPartOfField(path, [&](const RadianceField& field) {
     return SeenSplats(SplatsWithoutColors(field.geometry->splats), cameras,

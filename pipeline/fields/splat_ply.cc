@@ -3,6 +3,7 @@
 #include <bit>
 #include <vector>
 
+#include "kernels/splats/splat_field.h"
 #include "pipeline/fields/gaussian_ply.h"
 #include "pipeline/fields/placed_splats.h"
 #include "pipeline/files/atomic_file.h"
@@ -30,15 +31,21 @@ std::string Header(int64_t count, int basis, const std::string& comments) {
 void WriteSplatPly(const std::string& path, const StoredField& stored,
                    const std::string& comment) {
   static_assert(std::endian::native == std::endian::little);
-  const Splats splats = WorldSplats(stored);
+  const SplatsView<float> splats = SplatsOf(stored.field);
+  const SplatMove to_world = ToWorld(stored);
   const size_t basis = static_cast<size_t>(splats.basis);
-  std::string bytes =
-      Header(splats.count(), splats.basis,
+  const std::string header =
+      Header(splats.count, splats.basis,
              CommentLines(comment, stored.field.geometry->splats.fit_pixel == 0));
+  AtomicFile file(path, header.size() + static_cast<size_t>(splats.count) * sizeof(float) *
+                                            (14 + 3 * basis));
+  file.Write(header.data(), header.size());
   std::vector<float> row;
-  for (int64_t i = 0; i < splats.count(); ++i) {
-    const Splat<float> splat = splats.view()[i];
-    const float* const sh = splats.view().Coefficients(i);
+  for (int64_t i = 0; i < splats.count; ++i) {
+    ColoredSplat record = SplatAt(splats, i);
+    to_world.Apply(splats.basis, &record);
+    const Splat<float>& splat = record.splat;
+    const float* const sh = record.sh;
     row.assign({splat.mean.x, splat.mean.y, splat.mean.z, 0, 0, 0});
     for (size_t c = 0; c < 3; ++c) row.push_back(sh[c * basis]);
     for (size_t c = 0; c < 3; ++c)
@@ -46,9 +53,9 @@ void WriteSplatPly(const std::string& path, const StoredField& stored,
     row.push_back(splat.opacity_logit);
     for (int a = 0; a < 3; ++a) row.push_back(splat.log_scale[a]);
     row.insert(row.end(), splat.quaternion, splat.quaternion + 4);
-    bytes.append(reinterpret_cast<const char*>(row.data()), row.size() * sizeof(float));
+    file.Write(row.data(), row.size() * sizeof(float));
   }
-  WriteFileAtomically(path, bytes);
+  file.Commit();
 }
 
 }  // namespace regrade

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "kernels/image/decibels.h"
 #include "kernels/render/field_renderer.h"
@@ -59,9 +60,10 @@ std::vector<Camera> CheckedViews(const std::vector<Camera>& photos, int longest)
   return cameras;
 }
 
-PageCheck CheckPage(const RadianceField& exact, const RadianceField& page,
+PageCheck CheckPage(RadianceField exact, RadianceField page,
                     const std::vector<Camera>& cameras) {
-  const FieldRenderer of_exact(exact, Backend::kCpu), of_page(page, Backend::kCpu);
+  const FieldRenderer of_exact(std::move(exact), Backend::kCpu),
+      of_page(std::move(page), Backend::kCpu);
   PageCheck check{1e9, 0, static_cast<int>(cameras.size())};
   for (const Camera& camera : cameras) {
     const double db =

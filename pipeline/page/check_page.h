@@ -22,7 +22,7 @@ Camera SmallerView(const Camera& camera, int longest);
 // at least one.
 std::vector<Camera> CheckedViews(const std::vector<Camera>& photos, int longest);
 
-PageCheck CheckPage(const RadianceField& exact, const RadianceField& page,
+PageCheck CheckPage(RadianceField exact, RadianceField page,
                     const std::vector<Camera>& cameras);
 
 }  // namespace regrade

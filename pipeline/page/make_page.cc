@@ -15,6 +15,7 @@
 #include "pipeline/fields/field_file.h"
 #include "pipeline/fields/object_file.h"
 #include "pipeline/fields/residual_file.h"
+#include "pipeline/fields/seen_field.h"
 #include "pipeline/files/text.h"
 #include "pipeline/images/image_file.h"
 #include "pipeline/page/check_page.h"
@@ -26,7 +27,6 @@
 #include "pipeline/workspace/style_folders.h"
 #include "stylize/field/apply_network.h"
 #include "stylize/field/blend_fields.h"
-#include "stylize/training/restyle_field.h"
 
 namespace regrade {
 namespace {
@@ -67,13 +67,13 @@ StyleLayers InPageOrder(const StyleLayers& layers, const std::vector<int64_t>& o
 // The styled field without any rounding.
 RadianceField ExactStyle(const RadianceField& source, const StoredNetwork& network,
                          const StyleLayers& layers) {
-  RadianceField padded = source;
-  padded.appearance = PadShBasis(std::move(padded.appearance), kStyledBasis);
-  RadianceField exact = padded;
-  exact.appearance = ApplyNetwork(network.network, padded);
-  exact.background = network.background;
+  RadianceField exact{source.geometry, ApplyNetwork(network.network, source),
+                      network.background, source.near_clip, source.march};
   if (!layers.residual.color.empty()) AddResidual(layers.residual, &exact.appearance);
-  return layers.weight.empty() ? exact : MixFields(padded, {&exact}, {1}, &layers.weight);
+  if (layers.weight.empty()) return exact;
+  RadianceField padded = source;
+  padded.appearance = PadShBasis(std::move(padded.appearance), exact.appearance.basis);
+  return MixFields(padded, {&exact}, {1}, &layers.weight);
 }
 
 Image RenderHome(const RadianceField& field, const Camera& home) {
@@ -216,8 +216,9 @@ class RankedSplats {
   }
 
   std::string Line(const MadePage& page) const {
-    const PageCheck check =
-        CheckPage(ReadFieldFile(path_).field, page.field, CheckedViews(photos_, kChecked));
+    const std::vector<Camera> checked = CheckedViews(photos_, kChecked);
+    const PageCheck check = CheckPage(SeenPart(ReadFieldGeometry(path_), path_, checked).field,
+                                      page.field, checked);
     return Concat("the page has those ", page.records, " of ", order_.size(),
                   " splats that photos show most: ") +
            CheckLine("its pictures", check);

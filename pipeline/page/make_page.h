@@ -21,11 +21,6 @@ struct PageOptions {
 
   template <typename Bind>
   void Describe(Bind& bind) {
-    bind("page-step", step,
-         {.help = "step of rounded colour coefficients: a smaller one costs bytes and lowers "
-                  "the error",
-          .min = 1e-4,
-          .max = 1});
     bind("check", check,
          {.help = "measures how far renders of the page's field and styles are from the exact "
                   "ones, and prints it"});

@@ -113,7 +113,6 @@ struct ReconstructReport {
   std::vector<std::string> heldout;  // the user's file names
   Curve psnr_at_steps;               // dB on the rays of the last steps
   // Of the trial that decides for or against view dependence.
-  std::optional<double> trial_seconds, trial_cpu_seconds;
   std::optional<RefineReport> refined;
 
   template <typename Visit>
@@ -143,8 +142,6 @@ struct ReconstructReport {
     visit("sharpness", sharpness, {.label = "sharpness", .optional = true});
     visit("heldout", heldout, {.label = "photos held out"});
     visit("psnr_at_steps", psnr_at_steps);
-    visit("trial_seconds", trial_seconds);
-    visit("trial_cpu_seconds", trial_cpu_seconds);
     visit("refined", refined);
   }
 };

@@ -21,9 +21,7 @@ struct MeasuredOption {
 };
 
 struct FitKind {
-  const char* name;       // "voxels" or "splats", as --field has it
-  const char* work_unit;  // to which the time of a fit's steps is proportional
-  std::array<const char*, 2> work_options;  // which change it
+  const char* name;  // "voxels" or "splats", as --field has it
   // Rough seconds of two threads (AMD EPYC) for a million pixels of a film, of both fields.
   double film_frame;
 
@@ -37,7 +35,6 @@ struct FitKind {
   PlannedField (*field)(const RunSettings& settings, const FitPlace& place);
   // What it is lowered to, or an empty text. Throws Error(kResources).
   std::string (*lowered)(const RunSettings& settings, const FitPlace& place);
-  double (*work)(const RunSettings& settings, const FitPlace& place);  // in work_unit
   std::vector<MeasuredOption> (*measured)(const RunSettings& settings);
   // With `settings` adapted to `place`. Seeds and sums follow the settings, too.
   std::unique_ptr<FieldFit> (*make)(const RunSettings& settings, const FitPlace& place);

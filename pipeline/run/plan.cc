@@ -198,10 +198,10 @@ uint64_t PlannedMemory(double max_memory_gb, uint64_t available) {
 
 void CheckFitsMemory(const StagePlan& plan, uint64_t limit, const char* memory) {
   if (limit == 0 || plan.memory <= limit) return;
-  throw ResourceError(
-      "the fit would take about " + MemoryText(static_cast<double>(plan.memory)) + " of " +
-          memory + ", the limit is " + MemoryText(static_cast<double>(limit)),
-      "reconstruct", "use --preset draft, smaller --fit-resolutions or --splats");
+  throw ResourceError("the fit would take about " +
+                          MemoryText(static_cast<double>(plan.memory)) + " of " + memory +
+                          ", the limit is " + MemoryText(static_cast<double>(limit)),
+                      "reconstruct", "use --preset draft or fewer --splats");
 }
 
 bool LowerToMemory(const std::function<StagePlan(const FitOptions&)>& plan_of, uint64_t limit,

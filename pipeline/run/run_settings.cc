@@ -112,8 +112,7 @@ bool MeasuresFilm(const RunSettings& settings) {
 void CheckTogether(const RunSettings& settings) {
   const size_t grids = settings.fit.resolutions.size(), steps = settings.fit.steps.size();
   if (grids != steps)
-    throw UsageError(Concat(grids, " and ", steps, " stages"),
-                     "--fit-resolutions and --fit-steps",
+    throw UsageError(Concat(grids, " and ", steps, " stages"), "fit-resolutions and fit-steps",
                      "give both the same number of stages");
   for (const auto& [sides, flag] :
        {std::pair{&settings.fit.resolutions_y, "fit-resolutions-y"},

@@ -68,7 +68,6 @@ struct StyleSource {
   MatchChoice match;
   std::string name;
   double strength = 1;
-  bool keep_field = false;
 
   // The one that stages work on, the first of several that are matched; empty where there is
   // none.
@@ -89,9 +88,6 @@ struct StyleSource {
                   "style's",
           .min = 0,
           .max = 1});
-    bind("keep-field", keep_field,
-         {.help = "writes the styled field to styled.npz; without it, whoever needs the field "
-                  "makes it again from field.npz and network.npz"});
   }
 };
 

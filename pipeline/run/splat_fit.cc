@@ -102,10 +102,6 @@ std::string LoweredSplats(const RunSettings& settings, const FitPlace& place) {
   return SplatsWithinMemory(settings.splats, place).notice;
 }
 
-double PlannedSeconds(const RunSettings& settings, const FitPlace& place) {
-  return PlanSplats(settings, place).seconds;
-}
-
 std::vector<MeasuredOption> MeasuredOfSplats(const RunSettings& settings) {
   const SplatFitOptions& splats = settings.splats;
   const auto steps = [&](double factor) {
@@ -126,8 +122,6 @@ std::unique_ptr<FieldFit> MakeSplatFit(const RunSettings& settings, const FitPla
 }  // namespace
 
 const FitKind kSplatFit{.name = "splats",
-                        .work_unit = "planned seconds",
-                        .work_options = {"splat-steps", "splats"},
                         .film_frame = 0.75,
                         .options = OptionsOfSplats,
                         .sh_degree = DegreeOfSplats,
@@ -135,7 +129,6 @@ const FitKind kSplatFit{.name = "splats",
                         .plan = PlanSplats,
                         .field = PlannedSplatField,
                         .lowered = LoweredSplats,
-                        .work = PlannedSeconds,
                         .measured = MeasuredOfSplats,
                         .make = MakeSplatFit};
 

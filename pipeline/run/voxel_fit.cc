@@ -110,15 +110,6 @@ std::string LoweredVoxels(const RunSettings& settings, const FitPlace& place) {
   return FitWithinMemory(AdaptedTo(settings.fit, place), place).notice;
 }
 
-// Rays times the grid's side.
-double RayVoxels(const RunSettings& settings, const FitPlace& place) {
-  const FitOptions fit = AdaptOptions(settings.fit, {.pixels = place.pixels});
-  double sum = 0;
-  for (size_t s = 0; s < std::min(fit.steps.size(), fit.resolutions.size()); ++s)
-    sum += static_cast<double>(fit.steps[s]) * fit.rays_per_step * fit.resolutions[s];
-  return sum;
-}
-
 std::vector<MeasuredOption> MeasuredOfVoxels(const RunSettings& settings) {
   const FitOptions& fit = settings.fit;
   const auto steps = [&](double factor) { return Numbers(Scaled(fit.steps, factor, 1)); };
@@ -149,8 +140,6 @@ std::unique_ptr<FieldFit> MakeVoxelFit(const RunSettings& settings, const FitPla
 }  // namespace
 
 const FitKind kVoxelFit{.name = "voxels",
-                        .work_unit = "ray voxels",
-                        .work_options = {"fit-steps", "fit-resolutions"},
                         .film_frame = 2.1,
                         .options = OptionsOfVoxels,
                         .sh_degree = DegreeOfVoxels,
@@ -158,7 +147,6 @@ const FitKind kVoxelFit{.name = "voxels",
                         .plan = PlanVoxels,
                         .field = PlannedGrid,
                         .lowered = LoweredVoxels,
-                        .work = RayVoxels,
                         .measured = MeasuredOfVoxels,
                         .make = MakeVoxelFit};
 

@@ -51,6 +51,16 @@ std::vector<FrameUnit> UnitsOfPart(const std::vector<FrameUnit>& units,
   return own;
 }
 
+std::vector<std::vector<FrameUnit>> BatchesWithin(const std::vector<FrameUnit>& units,
+                                                  int64_t splats, uint64_t memory) {
+  constexpr uint64_t kProgramBytes = 150'000'000, kSplatBytes = 400;
+  if (memory == 0 || kProgramBytes + kSplatBytes * static_cast<uint64_t>(splats) <= memory)
+    return {units};
+  std::vector<std::vector<FrameUnit>> each;
+  for (const FrameUnit& unit : units) each.push_back({unit});
+  return each;
+}
+
 std::vector<Camera> CamerasOf(const std::vector<FrameUnit>& units) {
   std::vector<Camera> cameras;
   for (const FrameUnit& unit : units)

@@ -29,6 +29,12 @@ std::vector<FrameUnit> UnitsOf(const std::vector<FrameSet>& sets);
 std::vector<FrameUnit> UnitsOfPart(const std::vector<FrameUnit>& units,
                                    const std::string& part);
 
+// Units that are rendered from one field: all, where `splats` and what renders them fit into
+// `memory` bytes (0 where there is no limit), else each by itself, from the splats in its
+// pictures.
+std::vector<std::vector<FrameUnit>> BatchesWithin(const std::vector<FrameUnit>& units,
+                                                  int64_t splats, uint64_t memory);
+
 std::vector<Camera> CamerasOf(const std::vector<FrameUnit>& units);
 
 // To be called before each of their frames, with its set: reports how much is done, and throws

@@ -71,7 +71,7 @@ std::optional<double> LinearMapPsnr(const RadianceField& field,
   RadianceField mapped = field;
   mapped.appearance = ApplyColorMap(field.appearance, *better);
   mapped.background = MapBackground(*better, field.background);
-  const FieldRenderer renderer(mapped, backend);
+  const FieldRenderer renderer(std::move(mapped), backend);
   const FrameSource rendered{source.count,
                              [&](int i) { return renderer.Render(cameras[i]).color; }};
   return MeasureFidelity({"linear_map", PutGains(rendered, gains)},

@@ -108,7 +108,8 @@ void RequireEnough(const Capture& capture, int least, const std::string& poses) 
         Concat(Counted(count, "photo"), " with a pose, and a scene in 3D needs at least ",
                least),
         poses,
-        Concat("give poses of more photos; --pose-min-photos ", count, " tries with fewer"));
+        Concat("give poses of more photos; the constant pose-min-photos (--config), ", count,
+               ", tries with fewer"));
 }
 
 StageOutcome Reconstruct(RunContext* context, const JsonValue& inputs,
@@ -173,12 +174,9 @@ StageOutcome Reconstruct(RunContext* context, const JsonValue& inputs,
   EffectReport& view_dependence =
       *std::ranges::find(profile.effects, kViewDependence, &EffectReport::name);
   const ProgressFunction trial = parts.Next(kTrial);
-  const double trial_begin = context->console->StageSeconds(), trial_cpu_begin = CpuSeconds();
   view_dependence = resumes ? EffectsOfRecord(ParseJson(hooks.note, "checkpoint")).at(0)
                             : ProfileViewDependence(settings, &*fit, training_views, trial);
   hooks.note = DumpJson(EffectsRecord({view_dependence}), -1);
-  const double trial_seconds = context->console->StageSeconds() - trial_begin,
-               trial_cpu_seconds = CpuSeconds() - trial_cpu_begin;
   context->console->Detail(EffectLine(view_dependence));
   if (!view_dependence.on) fit->LimitDegree(0);
   hooks.progress = parts.Next(1);
@@ -202,10 +200,6 @@ StageOutcome Reconstruct(RunContext* context, const JsonValue& inputs,
   WriteGains(workspace.Path("poses"), capture, profile.exposure, profile.gains);
   if (!profile.gains.of_view.empty())
     outcome.outputs.push_back(std::string("poses/") + kExposureFile);
-  if (!resumes && view_dependence.value.value) {  // a prediction needs them apart
-    metrics.trial_seconds = trial_seconds;
-    metrics.trial_cpu_seconds = trial_cpu_seconds;
-  }
   metrics.rays = fitted.rays;
   metrics.psnr_train_db = fitted.psnr_train_db;
   metrics.rejected_voxels = fitted.rejected;

@@ -16,6 +16,8 @@
 #include "pipeline/files/npz_file.h"
 #include "pipeline/files/text.h"
 #include "pipeline/images/joined_film.h"
+#include "pipeline/program/memory.h"
+#include "pipeline/run/plan.h"
 #include "pipeline/stages/frame_writer.h"
 #include "pipeline/workspace/folder_lock.h"
 #include "pipeline/workspace/output_names.h"
@@ -102,6 +104,21 @@ std::string TextOf(const std::vector<FrameUnit>& units) {
 
 }  // namespace
 
+void RenderUnits(const std::vector<FrameUnit>& units, StoredField geometry,
+                 const RunContext& context, SceneFrames* frames,
+                 const std::function<void(const FrameUnit&)>& render) {
+  const std::string field = context.workspace->Path("field.npz");
+  const uint64_t memory =
+      PlannedMemory(context.settings.run.max_memory_gb, ReadMemoryStatus().available);
+  const auto batches = BatchesWithin(units, CountSplats(field), memory);
+  for (const std::vector<FrameUnit>& batch : batches) {
+    std::vector<Camera> cameras = CamerasOf(batch);
+    std::ranges::copy(frames->CamerasOfEdits(), std::back_inserter(cameras));
+    frames->Show(SeenPart(std::exchange(geometry, {}), field, cameras));
+    for (const FrameUnit& unit : batch) render(unit);
+  }
+}
+
 void RenderUnit(const FrameUnit& unit, const SeenByFewRecorder& seen,
                 const std::function<void(const FrameSet&)>& tick,
                 const std::function<void(SampledView)>& sample, SceneFrames* frames,
@@ -118,8 +135,7 @@ void RenderUnit(const FrameUnit& unit, const SeenByFewRecorder& seen,
 void RenderPart(const Stage& stage, RunContext* context) {
   Console* const console = context->console;
   const std::string title = "part " + context->parts.part + " of the frames and films";
-  const std::string field = context->workspace->Path("field.npz");
-  StoredField geometry = ReadFieldGeometry(field);
+  StoredField geometry = ReadFieldGeometry(context->workspace->Path("field.npz"));
   const FramePlan plan = PlanFrames(*context, geometry);
   const SharedWork work = PartsOf(*context, stage.inputs);
   const std::string& folder = work.path();
@@ -131,16 +147,12 @@ void RenderPart(const Stage& stage, RunContext* context) {
   work.Begin();
   console->Info(title + ": " + TextOf(units));
   console->BeginStage("render", title);
-  std::vector<Camera> cameras = CamerasOf(units);
-  // Photos with layers say where their edits are, see CarriedEdit.
-  if (!context->settings.residual.Layers().empty())
-    std::ranges::copy(plan.views.Cameras(), std::back_inserter(cameras));
-  SceneFrames frames(context, plan, SeenPart(std::move(geometry), field, cameras),
-                     [](StoredField) {});
+  SceneFrames frames(context, plan);
   const SeenByFewRecorder seen(plan.views, plan.near);
   const auto tick = TickOf(units, console->StageProgress());
-  for (const FrameUnit& unit : units)
+  RenderUnits(units, std::move(geometry), *context, &frames, [&](const FrameUnit& unit) {
     UnitWork{context, plan, &frames, seen, tick}.Do(folder, unit);
+  });
   console->EndStage();
   console->Info(title + ": done in " + DurationText(console->StageSeconds()));
 }

@@ -13,6 +13,12 @@
 
 namespace regrade {
 
+// Renders units, each after `begin(unit)`, from the field or, where it does not fit into
+// memory, from the parts of it that they see. `geometry`: of ReadFieldGeometry.
+void RenderUnits(const std::vector<FrameUnit>& units, StoredField geometry,
+                 const RunContext& context, SceneFrames* frames,
+                 const std::function<void(const FrameUnit&)>& render);
+
 // Renders the unit's frames to `writer`. `tick(set)` is called before each, and `sample` with
 // each that SeenByFewRecorder looks at.
 void RenderUnit(const FrameUnit& unit, const SeenByFewRecorder& seen,

@@ -5,7 +5,6 @@
 // which it is measured.
 #include <algorithm>
 #include <filesystem>
-#include <future>
 #include <iterator>
 #include <utility>
 
@@ -43,20 +42,17 @@ void SayPlan(const FramePlan& plan, const RenderOptions& options, Console* conso
     console->Info(note);
 }
 
-// What else comes of the styled field: styled.npz where it was asked for, and the styled
-// splats, whose writing is returned, see WriteStyledSplats.
-std::future<void> WriteStyledField(const RunContext& context, StoredField styled,
-                                   std::vector<std::string>* outputs) {
-  const std::string kept = context.style->Path("styled.npz");
-  if (context.settings.style.keep_field) {
-    WriteFieldFile(kept, styled);
-    outputs->push_back("styled.npz");
-  } else {
-    std::filesystem::remove(kept);  // of an earlier style
+// styled.ply of splats that were given.
+void WriteStyledField(const RunContext& context, std::vector<std::string>* outputs) {
+  const Workspace& style = *context.style;
+  if (!HasGivenSplats(context)) {
+    std::filesystem::remove(style.Path(kStyledSplats));  // of an earlier style
+    return;
   }
-  std::future<void> splats = WriteStyledSplats(context, std::move(styled));
-  if (splats.valid()) outputs->push_back(kStyledSplats);
-  return splats;
+  const StoredField plain = ReadFieldFile(context.workspace->Path("field.npz"));
+  WriteStyledSplats(context, plain,
+                    StyledFieldOf(plain, style.folder(), context.settings.style.strength));
+  outputs->push_back(kStyledSplats);
 }
 
 // Frames and films of an earlier start.
@@ -69,8 +65,9 @@ void RemoveFrames(const FramePlan& plan, const Workspace& style) {
     std::filesystem::remove(style.Path(name));
 }
 
-JoinedParts RenderAll(const FramePlan& plan, SceneFrames* frames, RunContext* context,
-                      const ProgressFunction& progress, SeenByFewRecorder* seen) {
+JoinedParts RenderAll(const FramePlan& plan, StoredField geometry, RunContext* context,
+                      const ProgressFunction& progress, SceneFrames* frames,
+                      SeenByFewRecorder* seen) {
   const RenderOptions& options = context->settings.render;
   const std::string& folder = context->style->folder();
   const std::vector<FrameUnit> units = UnitsOf(plan.sets);
@@ -79,12 +76,12 @@ JoinedParts RenderAll(const FramePlan& plan, SceneFrames* frames, RunContext* co
                  plan.film_of_views() ? options.fps : kSampleRate);
   {
     FrameWriter writer(folder, ParseVignette(options.vignette), &films);
-    for (const FrameUnit& unit : units) {
+    RenderUnits(units, std::move(geometry), *context, frames, [&](const FrameUnit& unit) {
       RenderUnit(
           unit, *seen, tick, [&](SampledView view) { seen->Add(std::move(view)); }, frames,
           &writer);
       if (unit.end == static_cast<int>(unit.set->cameras.size())) seen->Finish(*unit.set);
-    }
+    });
     writer.Finish();
   }
   JoinedParts rendered;
@@ -118,30 +115,24 @@ StageOutcome Render(const JsonValue& inputs, RunContext* context,
   const RunSettings& settings = context->settings;
   const Workspace& style = *context->style;
   Console* const console = context->console;
-  StoredField before = ReadFieldFile(context->workspace->Path("field.npz"));
-  const FramePlan plan = PlanFrames(*context, before);
+  StoredField geometry = ReadFieldGeometry(context->workspace->Path("field.npz"));
+  const FramePlan plan = PlanFrames(*context, geometry);
   SeenByFewRecorder seen(plan.views, plan.near);
   StageOutcome outcome;
   outcome.outputs = {"frames"};
-  std::future<void> splats;
-  const auto take_styled = [&](StoredField styled) {
-    splats = WriteStyledField(*context, std::move(styled), &outcome.outputs);
-  };
+  SayPlan(plan, settings.render, console);
+  RemoveFrames(plan, style);
   JoinedParts rendered;
   if (context->parts.join) {
-    SayPlan(plan, settings.render, console);
-    RemoveFrames(plan, style);
     rendered = JoinParts(inputs, plan, context, &seen);
-    take_styled(StyledFieldOf(std::move(before), style.folder(), settings.style.strength));
   } else {
-    SceneFrames frames(context, plan, std::move(before), take_styled);
-    SayPlan(plan, settings.render, console);
-    RemoveFrames(plan, style);
-    rendered = RenderAll(plan, &frames, context, progress, &seen);
+    SceneFrames frames(context, plan);
+    rendered = RenderAll(plan, std::move(geometry), context, progress, &frames, &seen);
   }
+  geometry = {};
+  WriteStyledField(*context, &outcome.outputs);
   std::ranges::copy(rendered.films, std::back_inserter(outcome.outputs));
   WriteFrameNames(plan.views, style);
-  if (splats.valid()) splats.get();
   const RenderReport report = ReportOf(plan, rendered, seen, settings);
   const std::string few = report.seen_by_few.Sentence();
   if (report.seen_by_few.film.value.value_or(0) > kMuchSeenByFew)
@@ -162,7 +153,6 @@ Stage RenderStage(RunContext* context) {
       {"styled", context->ResultOf("stylize")},
       {"views_2d", context->ResultOf("style_2d")},
       {"strength", context->settings.style.strength},
-      {"keep_field", context->settings.style.keep_field},
       {"options", OptionValues(context->settings.scene, context->settings.render,
                                context->settings.style_2d)}};
   if (!context->settings.render.films.films) stage.inputs["films"] = false;

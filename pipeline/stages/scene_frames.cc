@@ -61,31 +61,32 @@ std::vector<FrameSet> PlannedSets(const RunContext& context) {
   return FrameSetsOf(views, options, PathOf(views, options, nullptr));
 }
 
-SceneFrames::SceneFrames(RunContext* context, const FramePlan& plan, StoredField before,
-                         const std::function<void(StoredField)>& take_styled)
+SceneFrames::SceneFrames(RunContext* context, const FramePlan& plan)
     : context_(context),
       plan_(plan),
       backend_(
           ChooseBackend(context->settings.run.device, context->settings.run.reproducible)) {
-  const RunSettings& settings = context->settings;
-  masks_ = OpenObjectMasks(settings, plan.views);
-  if (masks_ != nullptr)
-    object_ = std::make_unique<CoverageRenderer>(
-        before.field, ReadObjectFile(context->style->Path("object.npz"), before.records));
-  Prepare(std::move(before), take_styled);
+  masks_ = OpenObjectMasks(context->settings, plan.views);
   stylizer_ = MakeSceneStylizer(context, plan.views, masks_.get(),
                                 [this](const Image&, int) { return coverage_; });
-  edit_.emplace(settings.residual, plan.views, *source_);
 }
 
-// Fields have gigabytes: neither stays.
-void SceneFrames::Prepare(StoredField before,
-                          const std::function<void(StoredField)>& take_styled) {
-  source_.emplace(before.field, backend_);
-  StoredField after = StyledFieldOf(std::move(before), context_->style->folder(),
-                                    context_->settings.style.strength);
-  styled_.emplace(after.field, backend_);
-  take_styled(std::move(after));
+void SceneFrames::Show(StoredField before) {
+  const RunSettings& settings = context_->settings;
+  const Workspace& style = *context_->style;
+  source_.reset(), styled_.reset(), object_.reset();  // first: fields have gigabytes
+  if (masks_ != nullptr)
+    object_ = std::make_unique<CoverageRenderer>(
+        before.field, ReadObjectFile(style.Path("object.npz"), before.records));
+  styled_.emplace(StyledFieldOf(before, style.folder(), settings.style.strength).field,
+                  backend_);
+  source_.emplace(std::move(before.field), backend_);
+  if (!edit_) edit_.emplace(settings.residual, plan_.views, *source_);
+}
+
+std::vector<Camera> SceneFrames::CamerasOfEdits() const {
+  if (edit_ || context_->settings.residual.Layers().empty()) return {};
+  return plan_.views.Cameras();
 }
 
 // The scene as a camera of the photo's gain records it. Of the film, which is not measured on

@@ -2,7 +2,6 @@
 // the 2D method makes it of the former.
 #pragma once
 
-#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -41,18 +40,22 @@ std::vector<FrameSet> PlannedSets(const RunContext& context);
 
 class SceneFrames {
  public:
-  // `before`: the scene's field. `take_styled` gets the styled one, once it has been prepared.
   // Keeps references to `context` and `plan`.
-  SceneFrames(RunContext* context, const FramePlan& plan, StoredField before,
-              const std::function<void(StoredField)>& take_styled);
+  SceneFrames(RunContext* context, const FramePlan& plan);
+
+  // The scene's field, or the part of it that the next frames see, see FieldFor.
+  void Show(StoredField before);
 
   Frame Render(const FrameSet& set, int index);
+
+  // What the first field must show besides the frames: photos with layers say where their edits
+  // are, see CarriedEdit.
+  std::vector<Camera> CamerasOfEdits() const;
 
   double seconds() const { return seconds_; }  // of rendering both fields
   std::string device() const;
 
  private:
-  void Prepare(StoredField before, const std::function<void(StoredField)>& take_styled);
   void AddViews2d(const Camera& camera, int index, Frame* frame);
 
   RunContext* context_;

@@ -15,26 +15,27 @@
 
 namespace regrade {
 
-StoredField StyledFieldOf(StoredField source, const StoredNetwork& network, double strength,
-                          const std::vector<float>* object_weights,
+StoredField StyledFieldOf(const StoredField& source, const StoredNetwork& network,
+                          double strength, const std::vector<float>* object_weights,
                           const VoxelResidual* residual) {
-  RadianceField& field = source.field;
-  field.appearance = PadShBasis(std::move(field.appearance), kStyledBasis);
-  Appearance styled = ApplyNetwork(network.network, field);
-  if (residual != nullptr) AddResidual(*residual, &styled);
-  if (strength == 1 && object_weights == nullptr) {
-    field.appearance = std::move(styled);
-    field.background = network.background;
-  } else {
-    const RadianceField all{field.geometry, std::move(styled), network.background,
-                            field.near_clip, field.march};
-    field = MixFields(field, {&all}, {strength}, object_weights);
+  const RadianceField& field = source.field;
+  StoredField styled{{field.geometry, ApplyNetwork(network.network, field), network.background,
+                      field.near_clip, field.march},
+                     source.field_from_world,
+                     source.ndc,
+                     source.records};
+  if (residual != nullptr) AddResidual(*residual, &styled.field.appearance);
+  if (strength != 1 || object_weights != nullptr) {
+    RadianceField padded = field;
+    padded.appearance = PadShBasis(std::move(padded.appearance), styled.field.appearance.basis);
+    styled.field = MixFields(padded, {&styled.field}, {strength}, object_weights);
   }
-  RoundAsStored(&source.field.appearance);
-  return source;
+  RoundAsStored(&styled.field.appearance);
+  return styled;
 }
 
-StoredField StyledFieldOf(StoredField source, const std::string& style, double strength) {
+StoredField StyledFieldOf(const StoredField& source, const std::string& style,
+                          double strength) {
   const StoredNetwork network = ReadNetworkFile(style + "/network.npz");
   std::optional<ObjectWeights> object;
   if (const std::string file = style + "/object.npz"; std::filesystem::exists(file))
@@ -42,7 +43,7 @@ StoredField StyledFieldOf(StoredField source, const std::string& style, double s
   std::optional<VoxelResidual> residual;
   if (const std::string file = style + "/residual.npz"; std::filesystem::exists(file))
     residual = ReadResidualFile(file, source.records);
-  return StyledFieldOf(std::move(source), network, strength, object ? &object->all : nullptr,
+  return StyledFieldOf(source, network, strength, object ? &object->all : nullptr,
                        residual ? &*residual : nullptr);
 }
 

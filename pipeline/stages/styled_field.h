@@ -16,13 +16,13 @@ namespace regrade {
 // regions of object.npz; null where the whole scene is styled. `residual`: what is
 // added behind the network, see EQ(view-scale), or null. Deterministic: equal inputs give
 // equal bits, for any number of threads.
-StoredField StyledFieldOf(StoredField source, const StoredNetwork& network, double strength,
-                          const std::vector<float>* object_weights,
+StoredField StyledFieldOf(const StoredField& source, const StoredNetwork& network,
+                          double strength, const std::vector<float>* object_weights,
                           const VoxelResidual* residual = nullptr);
 
 // The same with the network.npz, object.npz and residual.npz of the style's folder. Throws
 // Error(kInput).
-StoredField StyledFieldOf(StoredField source, const std::string& style, double strength);
+StoredField StyledFieldOf(const StoredField& source, const std::string& style, double strength);
 
 // The same of field.npz in the output folder `scene`.
 StoredField ReadStyledField(const std::string& scene, const std::string& style,

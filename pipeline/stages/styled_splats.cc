@@ -2,13 +2,10 @@
 
 #include <algorithm>
 #include <filesystem>
-#include <span>
-#include <utility>
-#include <vector>
 
 #include "kernels/base/error.h"
+#include "pipeline/fields/colored_splat.h"
 #include "pipeline/fields/network_file.h"
-#include "pipeline/fields/placed_splats.h"
 #include "pipeline/fields/restyled_ply.h"
 #include "pipeline/fields/splat_ply.h"
 
@@ -25,46 +22,57 @@ std::string CommentOf(const RunContext& context) {
   return comment;
 }
 
-// Whether the given file is still there, unchanged, and in a format that is written back.
-bool CanCopy(const RunContext& context, const std::string& hash) {
-  std::error_code none;
-  if (!std::filesystem::is_regular_file(context.source, none)) return false;
-  return IsGaussianPly(context.source) && HashFile(context.source) == hash;
+// Of the file that the run was given; empty without one.
+std::string HashOfSplats(const RunContext& context) {
+  const auto record = context.workspace->Find("reconstruct");
+  const JsonValue* const hash = record ? record->inputs.Find("splats") : nullptr;
+  return hash == nullptr ? "" : hash->AsString();
 }
 
-// The splats that the style leaves as they are: outside of its objects all are.
-std::vector<bool> Untouched(const RunContext& context, const Appearance& styled) {
-  const Appearance plain = ReadFieldFile(context.workspace->Path("field.npz")).field.appearance;
-  const int64_t stride = plain.stride();
-  std::vector<bool> untouched;
-  for (int64_t i = 0; i < plain.sh.size(); i += stride)
-    untouched.push_back(
-        std::equal(plain.sh.data() + i, plain.sh.data() + i + stride, styled.sh.data() + i));
-  return untouched;
+// Whether the given file is still there, unchanged, and in a format that is written back.
+bool CanCopy(const RunContext& context) {
+  std::error_code none;
+  if (!std::filesystem::is_regular_file(context.source, none)) return false;
+  return IsGaussianPly(context.source) && HashFile(context.source) == HashOfSplats(context);
+}
+
+// Whether the style leaves splat i as it is: outside of its objects all are.
+bool IsUntouched(const Appearance& plain, const Appearance& styled, int64_t i) {
+  for (int c = 0; c < 3; ++c) {
+    const float* const before = plain.sh.data() + (3 * i + c) * plain.basis;
+    const float* const after = styled.sh.data() + (3 * i + c) * styled.basis;
+    if (!std::equal(before, before + plain.basis, after) ||
+        !std::all_of(after + plain.basis, after + styled.basis, [](float v) { return v == 0; }))
+      return false;
+  }
+  return true;
+}
+
+NewColors ColorsOf(const StoredField& plain, const StoredField& styled) {
+  const SplatTurn back(styled.field_from_world.rotation.Transposed());
+  const Appearance& colors = styled.field.appearance;
+  return {styled.field.geometry->num_voxels(), colors.basis,
+          [&plain, &colors, back](int64_t i, float* sh) {
+            if (IsUntouched(plain.field.appearance, colors, i)) return false;
+            ColoredSplat record;
+            std::copy_n(colors.sh.data() + i * colors.stride(), colors.stride(), record.sh);
+            back.Apply(colors.basis, &record);
+            std::copy_n(record.sh, colors.stride(), sh);
+            return true;
+          }};
 }
 
 }  // namespace
 
-std::future<void> WriteStyledSplats(const RunContext& context, StoredField styled) {
+bool HasGivenSplats(const RunContext& context) { return !HashOfSplats(context).empty(); }
+
+void WriteStyledSplats(const RunContext& context, const StoredField& plain,
+                       const StoredField& styled) {
   const std::string path = context.style->Path(kStyledSplats);
-  const auto record = context.workspace->Find("reconstruct");
-  const JsonValue* const hash = record ? record->inputs.Find("splats") : nullptr;
-  if (hash == nullptr) {
-    std::filesystem::remove(path);
-    return {};
-  }
-  return std::async(std::launch::async, [&context, path, hash = hash->AsString(),
-                                         styled = std::move(styled)] {
-    const Appearance& colors = styled.field.appearance;
-    if (CanCopy(context, hash))
-      WriteRestyled(context.source, path,
-                    ColorsBeforeMove(styled.field_from_world,
-                                     {colors.sh.data(), static_cast<size_t>(colors.sh.size())},
-                                     colors.basis),
-                    colors.basis, CommentOf(context), Untouched(context, colors));
-    else
-      WriteSplatPly(path, styled, CommentOf(context));
-  });
+  if (CanCopy(context))
+    WriteRestyled(context.source, path, ColorsOf(plain, styled), CommentOf(context));
+  else
+    WriteSplatPly(path, styled, CommentOf(context));
 }
 
 }  // namespace regrade

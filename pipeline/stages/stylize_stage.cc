@@ -22,6 +22,7 @@
 #include "pipeline/stages/stages.h"
 #include "pipeline/stages/style_residual.h"
 #include "pipeline/stages/style_targets.h"
+#include "pipeline/stages/trained_views.h"
 #include "pipeline/workspace/metrics_json.h"
 #include "pipeline/workspace/output_names.h"
 #include "stylize/field/base_map.h"
@@ -91,7 +92,8 @@ StageOutcome KeepColors(RunContext* context, const Vec3f& background,
   const Workspace& folder = *context->style;
   context->console->Warn(
       "the masks agree on no part of the scene: it keeps its colours. Check --masks, or lower "
-      "--mask-vote");
+      "the "
+      "constant mask-vote (--config)");
   WriteNetworkFile(folder.Path("network.npz"), {NetworkOfMap({}), 0, background});
   WriteObjectFile(folder.Path("object.npz"), weights);
   StageOutcome outcome;
@@ -143,11 +145,15 @@ StageOutcome Stylize(RunContext* context, const JsonValue& inputs,
                      const ProgressFunction& progress) {
   const RunSettings& settings = context->settings;
   Workspace& workspace = *context->style;
-  StoredField stored = ReadFieldFile(context->workspace->Path("field.npz"));
-  const WorkingViews views = context->Views().InField(stored);
+  StoredField geometry = ReadFieldGeometry(context->workspace->Path("field.npz"));
+  const WorkingViews views = context->Views().InField(geometry);
   ProgressParts parts(progress, 1 + (settings.object.On() ? kVoting : 0) +
                                     (settings.residual.On() ? kOfResidual : 0));
-  const std::vector<int> indices = StyledViews(workspace, views);
+  TrainedField trained_on =
+      ReadTrainedField(*context, std::move(geometry), views, StyledViews(workspace, views));
+  if (!trained_on.notice.empty()) context->console->Info(trained_on.notice);
+  StoredField& stored = trained_on.stored;
+  const std::vector<int>& indices = trained_on.views;
   const std::unique_ptr<ObjectMasks> object = OpenObjectMasks(settings, views);
   ObjectWeights weights;
   if (object != nullptr)
@@ -214,6 +220,7 @@ StageOutcome Stylize(RunContext* context, const JsonValue& inputs,
   }
   metrics.device = DeviceName(request.backend);
   metrics.notices = restyled.notices;
+  if (!trained_on.notice.empty()) metrics.notices.push_back(trained_on.notice);
   for (const std::string& warning : trained.warnings) metrics.notices.push_back(warning);
   if (const std::string why = WhySteep(trained); !why.empty()) {
     context->console->Detail(why);

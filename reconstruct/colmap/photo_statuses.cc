@@ -101,7 +101,7 @@ void RefuseUnregistered(const Capture& capture) {
              " were registered in one scene; the others:", names),
       "",
       "give photos of one scene that overlap by two thirds, or lower "
-      "--pose-min-registered to continue with the registered ones");
+      "the constant pose-min-registered (--config) to continue with the registered ones");
 }
 
 void RequirePoses(const Capture& capture, const std::vector<StagedPhoto>& photos,
@@ -119,15 +119,15 @@ void RequirePoses(const Capture& capture, const std::vector<StagedPhoto>& photos
       Concat(count, " of ", Photos(all), count == 1 ? " has" : " have", " a pose");
   const std::string remedy = "give poses of more of the photos, or take out photos without one";
   if (static_cast<int>(count) < options.min_photos)
-    throw SceneError(
-        Concat(have, ", and a scene in 3D needs at least ", options.min_photos), poses,
-        remedy + (count < 2 ? std::string()
-                            : Concat("; --pose-min-photos ", count, " tries with fewer")));
+    throw SceneError(Concat(have, ", and a scene in 3D needs at least ", options.min_photos),
+                     poses,
+                     remedy + (count < 2 ? std::string()
+                                         : Concat("; the constant pose-min-photos (--config), ",
+                                                  count, ", tries with fewer")));
   const double least = options.min_registered * static_cast<double>(all);
   if (static_cast<double>(count) < least)
-    throw SceneError(have + Format(", and at least %.0f are needed (--pose-min-registered)",
-                                   std::ceil(least)),
-                     poses, remedy + ", or lower --pose-min-registered");
+    throw SceneError(have + Format(", and at least %.0f are needed", std::ceil(least)), poses,
+                     remedy + ", or lower the constant pose-min-registered (--config)");
 }
 
 }  // namespace regrade

@@ -60,8 +60,8 @@ std::string NoteOnOtherModels(const AttemptResult& attempt);
 [[noreturn]] void RefuseUnregistered(const Capture& capture);
 
 // Throws Error(kScene) unless the given poses of `capture`, from the file or folder `poses`,
-// are as many as options ask for photos that are registered (--pose-min-photos and
-// --pose-min-registered). Not counted are photos beside a posed one whose file has the same
+// are as many as options ask for photos that are registered (pose-min-photos and
+// pose-min-registered). Not counted are photos beside a posed one whose file has the same
 // name with another extension: two files of one shot.
 void RequirePoses(const Capture& capture, const std::vector<StagedPhoto>& photos,
                   const PoseOptions& options, const std::string& poses);

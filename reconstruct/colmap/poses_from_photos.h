@@ -49,12 +49,16 @@ struct PoseOptions {
          .max = 10000,
          .constant = true});
     bind("pose-min-registered", min_registered,
-         {.help = "least fraction of the photos that must be registered", .min = 0, .max = 1});
+         {.help = "least fraction of the photos that must be registered",
+          .min = 0,
+          .max = 1,
+          .constant = true});
     bind("pose-min-photos", min_photos,
          {.unit = "photos",
           .help = "least number of photos that must be registered",
           .min = 2,
-          .max = 1000});
+          .max = 1000,
+          .constant = true});
     bind("pose-time-limit", time_limit_min,
          {.unit = "minutes",
           .help = "time limit for finding poses; 0 sets it by the number of photos",

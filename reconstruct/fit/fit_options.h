@@ -65,16 +65,16 @@ struct FitOptions {
           .help = "longest side of the grid in each stage, coarse to fine; memory grows with "
                   "its cube",
           .min = 8,
-          .max = 2048});
-    bind(
-        "fit-resolutions-y", resolutions_y,
-        {.unit = "voxels",
-         .help = "--fit-resolutions are of the box's x axis, and these of its y axis; none: as "
-                 "the box's sides",
-         .min = 2,
-         .max = 2048,
-         .may_be_empty = true,
-         .constant = true});
+          .max = 2048,
+          .constant = true});
+    bind("fit-resolutions-y", resolutions_y,
+         {.unit = "voxels",
+          .help = "fit-resolutions are of the box's x axis, and these of its y axis; none: as "
+                  "the box's sides",
+          .min = 2,
+          .max = 2048,
+          .may_be_empty = true,
+          .constant = true});
     bind("fit-resolutions-z", resolutions_z,
          {.unit = "voxels",
           .help = "the same of the z axis",
@@ -86,7 +86,8 @@ struct FitOptions {
          {.unit = "steps",
           .help = "optimizer steps in each stage; time grows with their sum",
           .min = 1,
-          .max = 1000000});
+          .max = 1000000,
+          .constant = true});
     bind("fit-rays", rays_per_step,
          {.unit = "rays",
           .help = "rays per step; 0: 4096, on a card more for captures of many pixels",

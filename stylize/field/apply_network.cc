@@ -22,9 +22,12 @@ Appearance ApplyForward(const ForwardPass& forward, float position_scale,
   constexpr int64_t kChunk = 1 << 17;  // voxels; 32 MB of features and results
   const std::vector<int32_t> vertex = VertexOfVoxel(*field.geometry);
   const int64_t n = field.geometry->num_voxels();
-  Appearance styled = field.appearance;
-  const int basis = styled.basis;
-  const NetworkRow shape = RowOf(basis);
+  const NetworkRow shape = RowOf(field.appearance.basis);
+  const int basis = shape.basis;
+  Appearance styled;
+  styled.basis = basis;
+  styled.sh.Resize(n * styled.stride());
+  styled.sphere_color.Resize(field.appearance.sphere_color.size());
   const SphereGeometry& spheres = field.geometry->spheres;
   const std::vector<int32_t> place = PlaceOfColumn(spheres);
   const int64_t all = n + spheres.num_texels();

@@ -9,8 +9,10 @@
 
 namespace regrade {
 
-// Of the field's own basis; texels of background spheres go through it as plain colours. Throws
-// InputError for a network that was made for another NetworkRow, and Interrupted on kStop.
+// With the harmonics of the network's row: nine a channel at least, for a 2D method that maps
+// each view by itself needs directions, also where the scene's own colours have none. Texels of
+// background spheres go through it as plain colours. Throws InputError for a network that was
+// made for another NetworkRow, and Interrupted on kStop.
 Appearance ApplyNetwork(const LipschitzNetwork& network, const RadianceField& field,
                         const ProgressFunction& progress = nullptr);
 

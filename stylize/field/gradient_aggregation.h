@@ -69,7 +69,8 @@ struct AggregationOptions {
                   "follows a 2D method that maps each view differently, and flickers more; "
                   "larger values are more consistent and less faithful to the 2D method",
           .min = 0,
-          .max = 1e6});
+          .max = 1e6,
+          .constant = true});
     bind("style-every-voxel", every_voxel,
          {.help = "sends every voxel through the network at each step, as the paper's "
                   "Algorithm 1, instead of those that the step's rays touch: same result, "

@@ -53,7 +53,8 @@ struct StyleOptions {
                   "the style's sky: from bottom to top as much as this step of one channel; 0 "
                   "looks at colours alone",
           .min = 0,
-          .max = 10});
+          .max = 10,
+          .constant = true});
     bind("style-max-side", max_side,
          {.unit = "pixels",
           .help = "longer side at which networks see a picture; memory and time grow "

@@ -3,7 +3,7 @@
 //   method_benchmark METHOD[,METHOD...] STYLE.jpg[,STYLE.jpg...] SIDE SHEET.png FOLDER...
 //
 // METHOD is as of --method: mkl, gmm, reinhard or onnx:DIR; gmm+height is gmm
-// with --height-weight 1. Pictures are brought to SIDE pixels. SHEET.png shows one picture of
+// with height-weight 1. Pictures are brought to SIDE pixels. SHEET.png shows one picture of
 // each folder in each style, by each method; "-" writes none. Prints a Markdown table; a row is
 // a mean over folders and styles, the worst in brackets: the distance of the styled pictures'
 // colours to the style's (sliced Wasserstein), structure (correlation of edges with the

@@ -20,7 +20,7 @@ std::vector<std::string> Words(std::string_view bytes) {
 
 std::vector<std::string> OptionSeeds() {
   return {
-      "photos\n--out\nx\n--seed=7\n--reproducible\n--field=voxels\n--fit-steps\n10,20\n--no-"
+      "photos\n--out\nx\n--seed=7\n--reproducible\n--field=splats\n--splat-steps\n10\n--no-"
       "json",
       "--threads\n2\n--fps\n24.5\n--\n--not-an-option", "--preset\ndraft\n--effects\nndc=off"};
 }
@@ -43,7 +43,7 @@ bool ReadOptions(std::string_view bytes) {
 std::string MutateOptions(std::string text, FuzzRandom* random) {
   static const std::vector<std::string> kWords = {"\n",
                                                   "--",
-                                                  "--fit-steps\n",
+                                                  "--splat-steps\n",
                                                   "--photo-size\n",
                                                   "=",
                                                   ",",

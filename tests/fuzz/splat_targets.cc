@@ -110,7 +110,7 @@ bool ReadPly(std::string_view bytes) {
     if (scene.format != SplatFormat::kPly) return;
     std::vector<float> sh(scene.splats.sh.size(), 0.25f);
     try {
-      WriteRestyled(path, path + ".out", sh, scene.splats.basis, "fuzz");
+      WriteRestyled(path, path + ".out", ColorsOf(sh, scene.splats.basis), "fuzz");
     } catch (const UsageError&) {
       return;  // colours of an integer type
     }

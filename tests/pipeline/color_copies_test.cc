@@ -47,7 +47,8 @@ class ColorCopies : public testing::PictureTest {
     const std::string out = scratch_ / name + "_out" + seed;
     testing::Said(testing::Joined(
         {"reconstruct", scratch_ / name + "/truth", "--out", out, "--seed", seed},
-        testing::Words("--photo-size 96 --field voxels --fit-resolutions 32 --fit-steps 300 "
+        testing::Words("--photo-size 96 --field voxels --config "
+                       R"({"fit-resolutions":[32],"fit-steps":[300]} )"
                        "--threads 2 --tracks given --holdout 0 --reproducible --effects "
                        "exposure=off,view-dependence=off")));
     const StoredField stored = ReadFieldFile(out + "/field.npz");

@@ -1,4 +1,4 @@
-// Cost tables: variants, stored measurements, the Pareto front, and predictions.
+// Cost tables: variants, stored measurements, and the Pareto front.
 #include "pipeline/study/cost_table.h"
 
 #include <gtest/gtest.h>
@@ -7,7 +7,6 @@
 
 #include "pipeline/report/cost_rows.h"
 #include "pipeline/study/duration_estimate.h"
-#include "pipeline/study/prediction.h"
 #include "tests/support/expect_error.h"
 #include "tests/support/temporary_folder.h"
 
@@ -143,100 +142,12 @@ TEST(MeasurementStore, KeepsMeasurementsOfTheSameFingerprint) {
   EXPECT_REGRADE_ERROR(MeasurementStore(path, "one"), ExitCode::kInput, "measurements.json");
 }
 
-Capture Photos(int count) {
-  Capture capture;
-  for (int i = 0; i < count; ++i) {
-    CaptureView view;
-    view.camera.width = 400;
-    view.camera.height = 300;
-    view.camera.fx = view.camera.fy = 300;
-    view.camera.camera_from_world.translation.x = -i;  // each at a place of its own
-    capture.views.push_back(view);
-  }
-  return capture;
-}
-
-TEST(Prediction, AppliesMeasuredUnitCostsToAnotherCapture) {
-  // Exactly 2e-9 s per ray voxel, and 3 s for the rest of the stage, 1 s of it for the trial.
-  RunSettings base;
-  base.fit.steps = {100, 100};
-  base.fit.resolutions = {50, 100};
-  const Capture capture = Photos(10), other = Photos(35);
-  const auto truth = [](const RunSettings& settings, const Capture& photos) {
-    return 2e-9 * AmountOf("ray voxels", settings, photos);
-  };
-  EXPECT_EQ(AmountOf("photo pixels", base, capture), 10 * 400 * 300);
-  EXPECT_EQ(AmountOf("ray voxels", base, capture), 100.0 * 4096 * 150);
-  const std::vector<Variant> variants =
-      VariantsOf(base, {{"fit-steps", "fit-stop"}, false, false, {}});
-  std::vector<Measurement> measured;
-  for (const Variant& variant : variants) {
-    RunSettings settings = base;
-    OptionSet options;
-    settings.Bind(&options);
-    options.ApplyConfig(variant.options, "here");
-    // A parameter that does not change the amount of work must be ignored.
-    const double factor = variant.parameter == "fit-stop" ? 7 : 1;
-    measured.push_back(Of(variant, factor * truth(settings, capture), 26));
-  }
-  const TemporaryFolder folder;
-  Workspace workspace(folder / "w");
-  workspace.Record("reconstruct", JsonValue::Object(), {}, 0.6 * truth(base, capture) + 3,
-                   JsonValue::Object{{"trial_seconds", 1}, {"trial_cpu_seconds", 1}},
-                   truth(base, capture) + 4);
-  RunContext run;
-  run.settings = base;
-  run.workspace = &workspace;
-  const std::vector<CostTerm> costs = LearnCosts(run, capture, variants, measured);
-  RunSettings larger = base;
-  larger.fit.steps = {700, 900};
-  const std::vector<StageTime> times =
-      Predict(CostsFromJson(
-                  JsonValue::Object{{"schema", kTradeoffSchema}, {"unit_costs", ToJson(costs)}},
-                  "here"),
-              larger, other);
-  ASSERT_EQ(times.size(), 1u);  // stages without a record are not predicted
-  EXPECT_EQ(times[0].stage, "reconstruct");
-  // 3.5 times as many photos, and one trial (ten training views are enough).
-  EXPECT_NEAR(times[0].cpu_seconds, truth(larger, other) + 3.5 * 3 + 1, 1e-6);
-  EXPECT_NEAR(times[0].seconds, 0.6 * truth(larger, other) + 3.5 * 2 + 1, 1e-6);
-}
-
-// Nine of ten photos of 400 x 300 are fitted with --holdout 10.
-TEST(Prediction, RayVoxelsAreOfAllStages) {
+TEST(CostTable, FitsOfSplatsVaryWhatSplatsHave) {
   RunSettings settings;
-  settings.fit.resolutions = {48, 96, 192};
-  settings.fit.steps = {1, 1, 50};
-  settings.run.holdout = 10;
-  const Capture capture = Photos(10);
-  EXPECT_EQ(PlaceOf(settings, capture).pixels, 9 * 400 * 300);
-  EXPECT_EQ(PlaceOf(settings, capture).photos, 9);
-  EXPECT_EQ(AmountOf("ray voxels", settings, capture), 4096.0 * (48 + 96 + 50 * 192));
-}
-
-// Half of the steps are half of the work, and costs of splats say nothing of voxels.
-TEST(Prediction, SplatsHaveTheirPlan) {
-  RunSettings settings, voxels;
   settings.scene.field = "splats";
-  const Capture capture = Photos(10);
-  RunSettings half = settings;
-  half.splats.steps /= 2;
-  const std::vector<CostTerm> costs = {{"reconstruct", "planned seconds", 3, 5}};
-  const double all = Predict(costs, settings, capture).at(0).seconds;
-  EXPECT_NEAR(Predict(costs, half, capture).at(0).seconds, all / 2, 1e-9 * all);
-  EXPECT_REGRADE_ERROR(Predict(costs, voxels, capture), ExitCode::kInput, "another kind");
   for (const Variant& variant : VariantsOf(settings, {}))
     EXPECT_FALSE(variant.parameter.starts_with("fit-") || variant.benchmark == "render")
         << variant.parameter;
-}
-
-TEST(Prediction, RefusesCostsOfAnotherSchema) {
-  EXPECT_REGRADE_ERROR(
-      CostsFromJson(JsonValue::Object{{"schema", 1}, {"unit_costs", JsonValue::Array{}}},
-                    "a.json"),
-      ExitCode::kInput, "schema 1, and this version reads schema 2");
-  EXPECT_REGRADE_ERROR(CostsFromJson(JsonValue::Object{}, "a.json"), ExitCode::kInput,
-                       "no schema");
 }
 
 TEST(DurationEstimate, ImprovesWithTheFirstMeasurement) {

@@ -37,8 +37,8 @@ struct Reconstruction {
 };
 
 const std::vector<std::string> kVoxels = {
-    "--field",           "voxels", "--config",    R"({"fit-rays": 2048})",
-    "--fit-resolutions", "24,48",  "--fit-steps", "100,150"};
+    "--field", "voxels", "--config",
+    R"({"fit-rays": 2048, "fit-resolutions": [24, 48], "fit-steps": [100, 150]})"};
 const std::vector<std::string> kSplats = {"--splat-steps", "400", "--splats", "4"};
 
 // `regrade reconstruct --reproducible`, at sizes of seconds.

@@ -1,12 +1,15 @@
-// What large scenes need: parts of a film, and pages of some of the splats.
+// What large scenes need: parts of a film, and styles and pages of some of the splats.
 #include <gtest/gtest.h>
 
 #include <filesystem>
 
 #include "pipeline/images/image_file.h"
 #include "pipeline/page/make_page.h"
+#include "pipeline/stages/trained_views.h"
+#include "tests/support/pinhole.h"
 #include "tests/support/source_dir.h"
 #include "tests/support/spawn.h"
+#include "tests/support/splat_ball.h"
 #include "tests/support/temporary_folder.h"
 #include "tests/support/tiny_run.h"
 
@@ -43,10 +46,33 @@ TEST(Parts, OfARetouchedSceneAreTheSameBytes) {
   fs::remove_all(style + "/frames");
   for (const char* film : {"styled.mp4", "source_vs_styled.mp4", "views_2d.mp4"})
     ASSERT_TRUE(fs::remove(style + "/" + film)) << film;
-  for (const char* part : {"1/3", "2/3", "3/3"})
-    testing::Said({"render", folder / "e", "--name", "half", "--part", part});
+  testing::Said({"render", folder / "e", "--name", "half", "--part", "1/2"});
+  // Each unit from what it sees of the field.
+  testing::Said(
+      {"render", folder / "e", "--name", "half", "--part", "2/2", "--max-memory", "0.01"});
   testing::Said({"render", folder / "e", "--name", "half", "--join", "--until", "render"});
   EXPECT_EQ(testing::ResultsOf(style), whole);
+}
+
+TEST(TrainedViews, AreAsManyAsFitEvenlyAmongAll) {
+  const RadianceField ball = testing::SplatBall(4000);
+  std::vector<Camera> cameras(8, testing::PinholeOf(20, 20, 100));
+  for (int i = 0; i < 8; ++i)  // each sees a stripe of its own
+    cameras[static_cast<size_t>(i)].camera_from_world.translation = {0.7 - 0.2 * i, 0, 3};
+  size_t before = 1;
+  for (uint64_t memory = 150'000'000; memory < 153'000'000; memory += 20'000) {
+    const std::vector<int> within = CamerasWithin(memory, ball, cameras);
+    EXPECT_GE(within.size(), before);
+    before = within.size();
+    if (before == 2) {
+      EXPECT_EQ(within, (std::vector<int>{0, 4}));
+    }
+    if (before == 4) {
+      EXPECT_EQ(within, (std::vector<int>{0, 2, 4, 6}));
+    }
+  }
+  EXPECT_EQ(before, 8u);
+  EXPECT_EQ(CamerasWithin(0, ball, cameras), std::vector<int>{0});
 }
 
 TEST(Page, OfAFieldThatIsTooLargeHasWhatPhotosShowMost) {

@@ -9,6 +9,7 @@
 #include "pipeline/fields/field_file.h"
 #include "pipeline/images/image_file.h"
 #include "pipeline/page/keyframes.h"
+#include "pipeline/stages/styled_field.h"
 #include "tests/support/keyframes.h"
 #include "tests/support/source_dir.h"
 #include "tests/support/temporary_folder.h"
@@ -42,13 +43,12 @@ TEST(MixCommand, AStyleMayKnowDirectionsThatItsSceneDoesNot) {
   const TemporaryFolder folder;
   const std::string style = testing::SourceDir() + "/assets/style_sunset.png";
   testing::WriteCapture(folder / "s", 6, "96x72");
-  testing::Said(
-      testing::Joined({"run", folder / "s/truth", "--style", style, "--out", folder / "e",
-                       "--effects", "view-dependence=off", "--keep-field"},
-                      testing::TinyFlags("voxels")));
+  testing::Said(testing::Joined({"run", folder / "s/truth", "--style", style, "--out",
+                                 folder / "e", "--effects", "view-dependence=off"},
+                                testing::TinyFlags("voxels")));
   EXPECT_EQ(ReadFieldFile(folder / "e/field.npz").field.appearance.basis, 1);
   const Appearance styled =
-      ReadFieldFile(folder / "e/styles/style_sunset/styled.npz").field.appearance;
+      ReadStyledField(folder / "e", folder / "e/styles/style_sunset").field.appearance;
   ASSERT_EQ(styled.basis, 9);
   float beyond = 0;
   for (int64_t i = 0; i < styled.sh.size(); ++i)
@@ -62,16 +62,17 @@ TEST(MixCommand, H49_AFilmBetweenTheSceneAndItsStyle) {
   const TemporaryFolder folder;
   const std::string style = testing::SourceDir() + "/assets/style_sunset.png";
   testing::WriteCapture(folder / "s", 6, "96x72");
-  testing::Said(testing::Joined(
-      {"run", folder / "s/truth", "--style", style, "--out", folder / "e", "--keep-field"},
-      testing::TinyFlags()));
+  testing::Said(
+      testing::Joined({"run", folder / "s/truth", "--style", style, "--out", folder / "e"},
+                      testing::TinyFlags()));
 
   ExpectExactEnds(folder);
 
   // The field at the end is the style's file, and the folder of a mix may be used again.
   ASSERT_EQ(Regrade({"mix", folder / "e", "--mix", "1", "--out", folder / "m"}).code, 0);
-  EXPECT_EQ(ReadText(folder / "m/mixed.npz"),
-            ReadText(folder / "e/styles/style_sunset/styled.npz"));
+  WriteFieldFile(folder / "styled.npz",
+                 ReadStyledField(folder / "e", folder / "e/styles/style_sunset"));
+  EXPECT_EQ(ReadText(folder / "m/mixed.npz"), ReadText(folder / "styled.npz"));
 
   // The film of a page's path from the scene to its style.
   const std::string id = PageStyleId(folder / "e/styles/style_sunset");

@@ -160,7 +160,7 @@ TEST(MixedSizes, H159_OneOfEachAndAPanorama) {
   CropPhoto(folder / "s", 0, 128, 96);
   CropPhoto(folder / "s", 1, 96, 96);
   CropPhoto(folder / "s", 2, 72, 96);
-  ReportOf(folder, {"--pose-min-photos", "4"});
+  ReportOf(folder, {"--config", R"({"pose-min-photos": 4})"});
   EXPECT_EQ(SizeOf(folder / "e/styles/style_sunset/frames/source/00003.png"), "64x16");
   EXPECT_EQ(SizeOf(folder / "e/styles/style_sunset/frames/common_source/00003.png"), "64x48");
 }
@@ -169,7 +169,7 @@ TEST(MixedSizes, H159_OneOfEachAndAPanorama) {
 TEST(MixedSizes, H159_FramesBelowTheFlowsPyramidHaveAReason) {
   const TemporaryFolder folder;
   testing::WriteCapture(folder / "s", 4, "512x64");
-  const JsonValue report = ReportOf(folder, {"--pose-min-photos", "4"});
+  const JsonValue report = ReportOf(folder, {"--config", R"({"pose-min-photos": 4})"});
   EXPECT_EQ(SizeOf(folder / "e/styles/style_sunset/frames/source/00000.png"), "64x8");
   const JsonValue& row = testing::RowOf(report, "styled");
   EXPECT_EQ(row.At("undefined_pairs").AsInt(), 3);

@@ -184,7 +184,7 @@ TEST_F(Options, HelpNamesWhatACommandRequires) {
   using Names = std::vector<std::string>;
   EXPECT_EQ(RequiredOptions("DIR --style PICTURE --out DIR [OPTIONS]"),
             (Names{"style", "out"}));
-  EXPECT_EQ(RequiredOptions("DIR --out DIR [--style PICTURE] [OPTIONS] | --predict DIR"),
+  EXPECT_EQ(RequiredOptions("DIR --out DIR [--style PICTURE] [OPTIONS] | --frames DIR"),
             (Names{"out"}));
   EXPECT_EQ(RequiredOptions("DIR [OPTIONS] | --frames DIR"), Names{});
 }

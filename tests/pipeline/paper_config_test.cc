@@ -210,11 +210,11 @@ TEST(PaperConfig, AutoChoosesByTheCaptureAndSaysWhy) {
   EXPECT_EQ(ChoosePaperConfig("tnt", {}).name, "tnt");
 }
 
-// A flag stays, also with the value that the base has, and is recorded.
+// A constant stays, also with the value that the base has, and is recorded.
 TEST(PaperConfig, TheChoiceKeepsWhatWasSetByHand) {
-  for (const char* steps : {"7,8,9", "25600,25600,51200"}) {
+  for (const char* steps : {"[7, 8, 9]", "[25600, 25600, 51200]"}) {
     Bound bound;
-    Resolve({"--preset", "paper", "--fit-steps", steps}, &bound);
+    Resolve({"--preset", "paper", "--config", Format(R"({"fit-steps": %s})", steps)}, &bound);
     ApplyPaperChoice({"llff", "a test"}, &bound.options);
     EXPECT_EQ(bound.settings.fit.resolutions_z, std::vector<int>({128, 128, 128}));
     EXPECT_EQ(bound.settings.scene.photo_size, 1008);

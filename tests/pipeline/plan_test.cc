@@ -212,8 +212,7 @@ TEST(Plan, TooLittleMemoryNamesWhatToLower) {
   EXPECT_REGRADE_ERROR(CheckFitsMemory(plan, 1999999999), ExitCode::kResources, "2.0 GB");
   EXPECT_REGRADE_ERROR(CheckFitsMemory(plan, 1999999999, "GPU memory"), ExitCode::kResources,
                        "GPU memory");
-  EXPECT_REGRADE_ERROR(CheckFitsMemory(plan, 1), ExitCode::kResources, "--preset draft",
-                       "--fit-resolutions");
+  EXPECT_REGRADE_ERROR(CheckFitsMemory(plan, 1), ExitCode::kResources, "--preset draft");
 }
 
 // Before a run fails its finest grids become coarser, no further than they must, and what was

@@ -178,11 +178,12 @@ TEST(Program, F73_ProbesReadOneFileAndReport) {
 }
 
 TEST(Program, F21_ContradictionsNameBoth) {
-  const ProgramOutcome outcome = Regrade({"reconstruct", "x", "--out", "y", "--field", "voxels",
-                                          "--fit-resolutions", "32", "--fit-steps", "9,9"});
+  const ProgramOutcome outcome =
+      Regrade({"reconstruct", "x", "--out", "y", "--field", "voxels", "--config",
+               R"({"fit-resolutions": [32], "fit-steps": [9, 9]})"});
   EXPECT_EQ(outcome.code, 2);
-  EXPECT_SAYS(outcome, "--fit-resolutions");
-  EXPECT_SAYS(outcome, "--fit-steps");
+  EXPECT_SAYS(outcome, "fit-resolutions");
+  EXPECT_SAYS(outcome, "fit-steps");
 }
 
 TEST(Program, TheStyleMethodIsCheckedBeforeAnyWork) {

@@ -65,7 +65,7 @@ TEST(Requirements, WithoutANumber) {
   EXPECT_EQ(Failed("styled:psnr-to-2d>=1")[0],
             "styled:psnr-to-2d>=1: psnr_to_2d of styled has no value (not a number)");
   for (const char* text : {"source:tc-psnr:1>=1", "stylize:bound<=9", "styled:lpips-to-2d<=1",
-                           "reconstruct:trial-seconds<=1"})
+                           "stylize:loss-balance<=1"})
     EXPECT_EQ(Failed(text).size(), 1u) << text;
   EXPECT_TRUE(Failed("path-styled:tc-psnr:1>=99").empty());
   EXPECT_EQ(Failed("path-styled:tc-psnr:1<=99").size(), 1u);

@@ -177,11 +177,13 @@ TEST(ResolveSettings, LaterSourcesOverrideEarlierOnes) {
 TEST(ResolveSettings, FlagsOfTheOtherKindOfFieldAreRefused) {
   EXPECT_EQ(Resolve({}).settings.scene.field, "splats");
   EXPECT_EQ(Resolve({"--preset", "paper"}).settings.scene.field, "voxels");
-  EXPECT_REGRADE_ERROR(Resolve({"--fit-steps", "10"}), ExitCode::kUsage, "--field voxels");
+  EXPECT_REGRADE_ERROR(Resolve({"--config", R"({"fit-steps": [10]})"}), ExitCode::kUsage,
+                       "--field voxels");
   EXPECT_REGRADE_ERROR(Resolve({"--preset", "paper", "--splat-steps", "10"}), ExitCode::kUsage,
                        "--field splats");
-  EXPECT_EQ(Resolve({"--field", "voxels", "--fit-steps", "10"}).settings.fit.steps,
-            std::vector<int>{10});
+  EXPECT_EQ(
+      Resolve({"--field", "voxels", "--config", R"({"fit-steps": [10]})"}).settings.fit.steps,
+      std::vector<int>{10});
   // Splats have far surroundings, and no device coordinates.
   CheckTogether(Resolve({"--effects", "background=on"}).settings);
   EXPECT_REGRADE_ERROR(CheckTogether(Resolve({"--effects", "ndc=on"}).settings),

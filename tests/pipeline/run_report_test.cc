@@ -66,12 +66,12 @@ TEST(RunReport, ShowsEveryPartOfTheRun) {
   const TemporaryFolder folder;
   const std::string style = testing::SourceDir() + "/assets/style_sunset.png";
   testing::WriteCapture(folder / "s", 6, "96x72");
-  std::vector<std::string> run = testing::Words(
-      "--preset draft --effects exposure=off --device cpu --verbose --config "
-      R"({"style-rays":512})");
+  std::vector<std::string> run =
+      testing::Words("--preset draft --effects exposure=off --device cpu --verbose");
   run.insert(run.begin(), {"run", folder / "s/truth", "--style", style, "--out", folder / "e"});
   for (const std::string& flag : testing::TinyFlags("voxels")) run.push_back(flag);
-  *(std::find(run.begin(), run.end(), "--fit-steps") + 1) = "150";
+  *(std::find(run.begin(), run.end(), "--config") + 1) =
+      R"({"style-rays": 512, "fit-resolutions": [24], "fit-steps": [150]})";
   const testing::ProgramOutcome done = Regrade(run);
   ASSERT_EQ(done.code, 0) << done.text;
   EXPECT_SAYS(done, "exposure off: not measured (off by --effects)");

@@ -18,6 +18,7 @@ namespace regrade {
 namespace {
 
 using testing::CastSplats;
+using testing::ColorsOf;
 using testing::PlyOf;
 using testing::PlyStyle;
 using testing::RandomSplats;
@@ -146,7 +147,7 @@ TEST(RestyledPly, ChangesOnlyTheColours) {
         other.sh = CastSplats<float>(RandomSplats(20, 9, 6)).sh;
         const std::string before = PlyOf(splats, style), expected = PlyOf(other, style);
         WriteText(folder / "in.ply", before);
-        WriteRestyled(folder / "in.ply", folder / "out.ply", other.sh, 9, "a\nstyle");
+        WriteRestyled(folder / "in.ply", folder / "out.ply", ColorsOf(other.sh, 9), "a\nstyle");
         std::string after = ReadText(folder / "out.ply");
         const std::string line = "comment a\\x0astyle\n";
         const size_t at = after.find(line);
@@ -170,7 +171,7 @@ TEST(RestyledPly, HigherDegreesBecomeZeroAndDroppedSplatsStay) {
   EXPECT_EQ(scene.first_dropped, 4);
   std::vector<float> sh(3 * 4 * 19);
   for (size_t i = 0; i < sh.size(); ++i) sh[i] = static_cast<float>(i);
-  WriteRestyled(folder / "a.ply", folder / "a.ply", sh, 4, "styled");
+  WriteRestyled(folder / "a.ply", folder / "a.ply", ColorsOf(sh, 4), "styled");
   const SplatScene back = ReadSplats(folder / "a.ply");
   EXPECT_EQ(back.splats.mean, scene.splats.mean);
   for (size_t i = 0; i < 19 * 3; ++i)
@@ -188,12 +189,12 @@ TEST(RestyledPly, SplatsThatAreKeptKeepTheirBytes) {
   WriteText(folder / "in.ply", before);
   const std::vector<float> sh(3 * 4 * 20);
   std::vector<bool> kept(20, true);
-  WriteRestyled(folder / "in.ply", folder / "out.ply", sh, 4, "x", kept);
+  WriteRestyled(folder / "in.ply", folder / "out.ply", ColorsOf(sh, 4, kept), "x");
   std::string after = ReadText(folder / "out.ply");
   after.erase(after.find("comment x\n"), 10);
   EXPECT_TRUE(after == before);
   kept[3] = false;
-  WriteRestyled(folder / "in.ply", folder / "out.ply", sh, 4, "x", kept);
+  WriteRestyled(folder / "in.ply", folder / "out.ply", ColorsOf(sh, 4, kept), "x");
   const Splats some = ReadSplats(folder / "out.ply").splats, all = SomeSplats(4);
   for (size_t k = 0; k < sh.size(); ++k) EXPECT_EQ(some.sh[k], k / 12 == 3 ? 0 : all.sh[k]);
 }
@@ -216,7 +217,7 @@ TEST(RestyledPly, AnotherFileIsRefusedAndNothingWritten) {
   const auto write = [&folder](const std::string& bytes, int64_t count) {
     WriteText(folder / "in.ply", bytes);
     const std::vector<float> sh(static_cast<size_t>(3 * count));
-    WriteRestyled(folder / "in.ply", folder / "out.ply", sh, 1, "");
+    WriteRestyled(folder / "in.ply", folder / "out.ply", ColorsOf(sh, 1), "");
   };
   const std::string file = PlyOf(SomeSplats(4));
   EXPECT_REGRADE_ERROR(write(file, 19), ExitCode::kInput, "no longer has the 19 splats");
@@ -238,7 +239,7 @@ TEST(SplatFiles, RealPlysAreRead) {
   EXPECT_EQ(bot.splats.basis, 9);
   const TemporaryFolder folder;
   const std::string path = testing::DataPath("splats/playbot_lod5_sh2.ply");
-  WriteRestyled(path, folder / "out.ply", bot.splats.sh, 9, "x");
+  WriteRestyled(path, folder / "out.ply", ColorsOf(bot.splats.sh, 9), "x");
   std::string same = ReadText(folder / "out.ply");
   same.erase(same.find("comment x\n"), 10);
   EXPECT_TRUE(same == ReadText(path));

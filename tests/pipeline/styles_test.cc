@@ -60,7 +60,6 @@ TEST(Styles, EachHasItsFolderAndNothingIsOverwritten) {
     for (const char* file : {"styled.mp4", "network.npz", "report.html", "report.json",
                              "frames/styled/00000.png", "run.json"})
       EXPECT_TRUE(fs::exists(folder / (std::string("e/styles/") + style + "/" + file))) << file;
-  EXPECT_FALSE(fs::exists(folder / "e/styles/style_night/styled.npz"));
   EXPECT_EQ(ReadText(folder / "e/styled.mp4"),
             ReadText(folder / "e/styles/style_night/styled.mp4"));
 
@@ -113,17 +112,24 @@ TEST(Styles, EachHasItsFolderAndNothingIsOverwritten) {
   EXPECT_SAYS(done, "style_night, style_night-2, style_sunset");
 }
 
+// field.npz of a style.
+std::string StyledFile(const TemporaryFolder& folder, const std::string& style) {
+  WriteFieldFile(folder / "styled.npz",
+                 ReadStyledField(folder / "e", folder / ("e/styles/" + style)));
+  return ReadText(folder / "styled.npz");
+}
+
 TEST(Styles, StrengthIsAMixOfSceneAndStyle) {
   const TemporaryFolder folder;
   Synth(folder);
   ProgramOutcome done =
-      Regrade(RunOf(folder, "e", {"--style", Asset("sunset"), "--name", "s", "--keep-field"}));
+      Regrade(RunOf(folder, "e", {"--style", Asset("sunset"), "--name", "s"}));
   ASSERT_EQ(done.code, 0) << done.text;
   const std::string network = ReadText(folder / "e/styles/s/network.npz"),
-                    whole = ReadText(folder / "e/styles/s/styled.npz");
+                    whole = StyledFile(folder, "s");
   for (const char* strength : {"0.5", "0"}) {
     done = Regrade({"stylize", folder / "e", "--name", "s", "--style", Asset("sunset"),
-                    "--keep-field", "--strength", strength});
+                    "--strength", strength});
     ASSERT_EQ(done.code, 0) << done.text;
     EXPECT_SAYS(done, "stylize: done before");
     EXPECT_TRUE(ReadText(folder / "e/styles/s/network.npz") == network);
@@ -140,8 +146,8 @@ TEST(Styles, StrengthIsAMixOfSceneAndStyle) {
       WriteText(folder / "whole.npz", whole);
       testing::Said({"mix", folder / "e", folder / "whole.npz", "--mix", strength, "--out",
                      folder / "m"});
-      EXPECT_FALSE(ReadText(folder / "e/styles/s/styled.npz") == whole);
-      const StoredField a = ReadFieldFile(folder / "e/styles/s/styled.npz"),
+      EXPECT_FALSE(StyledFile(folder, "s") == whole);
+      const StoredField a = ReadFieldFile(folder / "styled.npz"),
                         b = ReadFieldFile(folder / "m/mixed.npz");
       // The style is rounded to half precision before the mix in one, after it in the other:
       // values below 8 differ by at most 2^-9.
@@ -305,12 +311,10 @@ TEST(Points, AreWrittenInTheCapturesWorldAndLabelled) {
 TEST(Clean, RemovesOnlyWhatCanBeMadeAgain) {
   const TemporaryFolder folder;
   Synth(folder);
-  std::vector<std::string> run =
-      RunOf(folder, "e", {"--style", Asset("sunset"), "--keep-field"});
+  std::vector<std::string> run = RunOf(folder, "e", {"--style", Asset("sunset")});
   ASSERT_EQ(Regrade(run).code, 0);
   const std::string style = folder / "e/styles/style_sunset";
-  const std::string film = ReadText(style + "/styled.mp4"),
-                    field = ReadText(style + "/styled.npz");
+  const std::string film = ReadText(style + "/styled.mp4");
   ProgramOutcome done = Regrade({"clean", folder / "e", "--dry-run"});
   EXPECT_EQ(done.code, 0);
   EXPECT_SAYS(done, "can be made again");
@@ -320,49 +324,42 @@ TEST(Clean, RemovesOnlyWhatCanBeMadeAgain) {
   EXPECT_TRUE(fs::exists(style + "/frames"));
   ASSERT_EQ(Regrade({"clean", folder / "e", "--yes"}).code, 0);
   EXPECT_FALSE(fs::exists(style + "/frames"));
-  EXPECT_FALSE(fs::exists(style + "/styled.npz"));
   EXPECT_TRUE(ReadText(style + "/styled.mp4") == film);
   ASSERT_EQ(Regrade(run).code, 0);  // made again, to the bit
-  EXPECT_TRUE(ReadText(style + "/styled.npz") == field);
   EXPECT_TRUE(ReadText(style + "/styled.mp4") == film);
 }
 
 // Background spheres, and the background colour that the scene's colour map changes.
-TEST(StyledField, IsRemadeToTheBit) {
+TEST(StyledField, IsWhatItsFileHolds) {
   const TemporaryFolder folder;
   Synth(folder);
-  const ProgramOutcome done =
-      Regrade(RunOf(folder, "e",
-                    {"--style", Asset("sunset"), "--keep-field", "--effects", "background=on",
-                     "--config", R"({"background-layers": 4, "background-resolution": 16})"},
-                    "voxels"));
-  ASSERT_EQ(done.code, 0) << done.text;
+  std::vector<std::string> run =
+      RunOf(folder, "e", {"--style", Asset("sunset"), "--effects", "background=on"}, "voxels");
+  *(std::ranges::find(run, "--config") + 1) =
+      R"({"fit-resolutions": [24], "fit-steps": [30], "background-layers": 4,
+          "background-resolution": 16})";
+  testing::Said(run);
   const std::string style = folder / "e/styles/style_sunset";
   const StoredField source = ReadFieldFile(folder / "e/field.npz");
   EXPECT_TRUE(source.field.geometry->spheres.on());
   EXPECT_NE(source.field.background.x, ReadNetworkFile(style + "/network.npz").background.x);
-  WriteFieldFile(folder / "again.npz", ReadStyledField(folder / "e", style));
-  EXPECT_TRUE(ReadText(folder / "again.npz") == ReadText(style + "/styled.npz"));
-  // In memory it is what the file holds.
+  StyledFile(folder, "style_sunset");
   const StoredField remade = ReadStyledField(folder / "e", style),
-                    read = ReadFieldFile(style + "/styled.npz");
+                    read = ReadFieldFile(folder / "styled.npz");
   for (int64_t i = 0; i < read.field.appearance.sh.size(); ++i)
     ASSERT_EQ(remade.field.appearance.sh[i], read.field.appearance.sh[i]) << i;
 }
 
-TEST(StyledField, WithObjectWeightsToo) {
+TEST(StyledField, HasItsObjectsWeights) {
   const TemporaryFolder folder;
   Synth(folder, {"--effects", "masks"});
   testing::Said(
-      RunOf(folder, "e",
-            {"--style", Asset("sunset"), "--keep-field", "--masks", folder / "s/masks"}));
+      RunOf(folder, "e", {"--style", Asset("sunset"), "--masks", folder / "s/masks"}));
   const std::string style = folder / "e/styles/style_sunset";
-  WriteFieldFile(folder / "again.npz", ReadStyledField(folder / "e", style));
-  EXPECT_TRUE(ReadText(folder / "again.npz") == ReadText(style + "/styled.npz"));
   WriteFieldFile(folder / "whole.npz",
                  StyledFieldOf(ReadFieldFile(folder / "e/field.npz"),
                                ReadNetworkFile(style + "/network.npz"), 1, nullptr));
-  EXPECT_FALSE(ReadText(folder / "whole.npz") == ReadText(style + "/styled.npz"));
+  EXPECT_FALSE(ReadText(folder / "whole.npz") == StyledFile(folder, "style_sunset"));
 }
 
 }  // namespace

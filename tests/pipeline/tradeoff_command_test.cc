@@ -1,4 +1,4 @@
-// regrade tradeoff with a tiny capture: its outputs, continuation and predictions.
+// regrade tradeoff with a tiny capture: its outputs and continuation.
 #include <gtest/gtest.h>
 
 #include <filesystem>
@@ -15,7 +15,7 @@ using testing::ProgramOutcome;
 using testing::Regrade;
 using testing::TemporaryFolder;
 
-TEST(TradeoffCommand, MeasuresContinuesAndPredicts) {
+TEST(TradeoffCommand, MeasuresAndContinues) {
   const TemporaryFolder folder;
   const std::string style = testing::SourceDir() + "/assets/style_sunset.png";
   testing::WriteCapture(folder / "s", 6, "96x72");
@@ -76,14 +76,6 @@ TEST(TradeoffCommand, MeasuresContinuesAndPredicts) {
   outcome = tradeoff({"--repeats", "1"});
   EXPECT_EQ(testing::CountOf(outcome.text, "] "), 0u) << outcome.text;
 
-  // The base is an ordinary run, and its time is predicted from the costs.
-  outcome = Regrade(
-      {"tradeoff", "--predict", folder / "t/base", "--costs", folder / "t/tradeoff.json"});
-  ASSERT_EQ(outcome.code, 0) << outcome.text;
-  for (const char* stage : {"reconstruct", "stylize", "render", "evaluate", "all"})
-    EXPECT_NE(outcome.text.find(std::string("\n") + stage), std::string::npos)
-        << stage << outcome.text;
-
   // In the folder of a run the table becomes part of its report; a damaged one or one of
   // another schema is omitted with a warning.
   const auto page = [&] {
@@ -116,9 +108,6 @@ TEST(TradeoffCommand, VariesFitsOfSplats) {
   EXPECT_EQ(result.At("costs").AsArray().size(), 2u + 3 + 4);
   for (const JsonValue& row : result.At("costs").AsArray())
     EXPECT_TRUE(row.At("accuracy").IsNumber()) << DumpJson(row, -1);
-  outcome = Regrade(
-      {"tradeoff", "--predict", folder / "t/base", "--costs", folder / "t/tradeoff.json"});
-  EXPECT_SAYS(outcome, "\nreconstruct");
 }
 
 TEST(TradeoffCommand, RefusesInvalidArguments) {
@@ -133,12 +122,6 @@ TEST(TradeoffCommand, RefusesInvalidArguments) {
           .code,
       2);
   EXPECT_EQ(Regrade({"tradeoff", folder / "photos"}).code, 2);
-  EXPECT_EQ(Regrade({"tradeoff", "--predict", folder / "photos"}).code, 2);
-  testing::WriteText(folder / "costs.json", "{}");
-  EXPECT_EQ(
-      Regrade({"tradeoff", "--predict", folder / "photos", "--costs", folder / "costs.json"})
-          .code,
-      3);
   EXPECT_FALSE(std::filesystem::exists(folder / "t"));
 }
 

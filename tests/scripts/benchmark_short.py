@@ -19,7 +19,7 @@ import sys
 import tempfile
 
 ROOT = os.path.join(os.path.dirname(os.path.abspath(__file__)), "../..")
-OPTIONS = "--photo-size 88 --field voxels --fit-resolutions 8,16 --fit-steps 20,20"
+OPTIONS = "--photo-size 88 --splat-steps 60 --splats 2"
 CONFIG = """
 regrade: {regrade}
 work: {work}

@@ -11,7 +11,7 @@ STAGES = ("pose", "reconstruct", "style_2d", "stylize", "render", "evaluate", "r
 STYLED = "styles/style_sunset"  # the folder of a run's style
 STYLE = os.path.join(os.path.dirname(os.path.abspath(__file__)), "../../assets/style_sunset.png")
 # Keys of the report that differ from run to run.
-TIMES = {"seconds", "cpu_seconds", "trial_seconds", "trial_cpu_seconds", "frames_per_second", "peak_memory_mb"}
+TIMES = {"seconds", "cpu_seconds", "frames_per_second", "peak_memory_mb"}
 
 
 def make_capture(regrade, folder, effects=""):

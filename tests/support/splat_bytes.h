@@ -5,11 +5,13 @@
 #include <cstdint>
 #include <cstdio>
 #include <cstring>
+#include <span>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "kernels/splats/splats.h"
+#include "pipeline/fields/restyled_ply.h"
 
 namespace regrade::testing {
 
@@ -18,6 +20,16 @@ std::string LittleEndian(T value) {
   std::string bytes(sizeof value, '\0');
   std::memcpy(bytes.data(), &value, sizeof value);
   return bytes;
+}
+
+// Colours [N, 3, basis] that must outlive the result; splats of `kept` [N] keep theirs.
+inline NewColors ColorsOf(std::span<const float> sh, int basis, std::vector<bool> kept = {}) {
+  const int64_t row = 3 * basis;
+  return {std::ssize(sh) / row, basis, [=](int64_t i, float* to) {
+            if (!kept.empty() && kept[static_cast<size_t>(i)]) return false;
+            std::copy_n(sh.begin() + i * row, row, to);
+            return true;
+          }};
 }
 
 struct PlyStyle {

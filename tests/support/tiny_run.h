@@ -30,7 +30,7 @@ inline std::vector<std::string> TinyFlags(const std::string& field = "splats") {
   if (field.empty()) return Words(flags);
   return Words(flags + "--field " + field +
                (field == "splats" ? " --splat-steps 60 --splats 2"
-                                  : " --fit-resolutions 24 --fit-steps 30"));
+                                  : " --config {\"fit-resolutions\":[24],\"fit-steps\":[30]}"));
 }
 
 // Contents of all networks, fields, films and frames below a folder.
