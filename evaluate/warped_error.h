@@ -34,10 +34,10 @@ struct WarpedError {
 using PairDistance = std::function<double(const Image&, const Image&)>;
 
 // EQ(warped-rmse-published), the comment of 26 April 2024 on StyleGaussian's issue 5: W is the
-// earlier frame splatted by k = W / (W - 1), H / (H - 1) and bias 1e-7; M(y) = 0 where the
-// channels of W(y) sum to exactly 0, else 1; rmse = sqrt(mean over all pixels and channels of
-// (W - M I_later)^2). `lpips` gets W and M I_later with values from 0 to 255. Frames and flow
-// (of the measured frames, to the later one) are those of PadFrame.
+// earlier frame splatted by k = width / (width - 1), height / (height - 1) and bias 1e-7; M(y)
+// = 0 where the channels of W(y) sum to exactly 0, else 1; rmse = sqrt(mean over all pixels and
+// channels of (W - M I_later)^2). `lpips` gets W and M I_later with values from 0 to 255.
+// Frames and flow (of the measured frames, to the later one) are those of PadFrame.
 WarpedError PublishedWarpedError(const Image& earlier, const Image& later,
                                  const FlowField& flow, const PairDistance& lpips);
 

@@ -28,7 +28,9 @@ struct StageEntry {
 };
 
 // The stages of a run, in order; each reads the results of earlier ones from the output folder.
-// The code of stage NAME begins in pipeline/stages/NAME_stage.cc.
+// The code of stage NAME begins in pipeline/stages/NAME_stage.cc. What is done before is known,
+// and checkpoints are read, by pipeline/workspace/stage_runner.h; memory is planned in
+// pipeline/run/fit_memory.h. Blocks of a larger field: pipeline/commands/refine_command.cc.
 // clang-format off
 constexpr StageEntry kStages[] = {
     // photos -> poses/: cameras and points by COLMAP or as given (reconstruct/colmap)
@@ -36,7 +38,8 @@ constexpr StageEntry kStages[] = {
     // poses/ -> field.npz: voxels (reconstruct/fit) or splats (reconstruct/splats) fitted to the
     // photos, whose exposure is undone where they are read (pipeline/capture/working_views.h);
     // the loss is in kernels/field/render_ray.h, its total variation in
-    // kernels/field/total_variation.h; that of splats is in kernels/image/picture_loss.h
+    // kernels/field/total_variation.h; that of splats is in kernels/image/picture_loss.h, its
+    // regularizers in kernels/splats/splat_update.h, births in reconstruct/splats/population.h
     {"reconstruct", ReconstructStage},
     // photos + style picture -> views_2d/: each photo styled in 2D (stylize/image)
     {"style_2d", Style2dStage},
@@ -44,8 +47,8 @@ constexpr StageEntry kStages[] = {
     // the field's colours (stylize/training); its loss is in
     // stylize/field/gradient_aggregation.h, its bound in stylize/field/lipschitz_network.h
     {"stylize", StylizeStage},
-    // field.npz + network.npz -> frames/ (a pixel of splats in kernels/splats/compositing.h, a
-    // ray through voxels in kernels/field/render_ray.h), films (pipeline/images/video_writer.h)
+    // field.npz + network.npz -> frames/ (a pixel of splats in kernels/splats/compositing.h,
+    // their colours in kernels/splats/splat_color.h, a ray through voxels in kernels/field/render_ray.h), films (pipeline/images/video_writer.h)
     {"render", RenderStage},
     // frames/ -> consistency (evaluate/consistency.h) and fidelity (evaluate/fidelity.h)
     // metrics, heatmaps/

@@ -1,4 +1,4 @@
-// The position of a splat in the box, as whoever compares positions of records has it.
+// A splat's position in the box, contracted outside it.
 #pragma once
 
 #include <cmath>

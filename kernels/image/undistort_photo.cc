@@ -12,7 +12,7 @@ namespace {
 
 // The largest |(x, y)| of directions (x, y, 1), up to `most`, within which image points move
 // outwards with it; beyond, the lens folds over.
-double FoldRadius(const Camera& own, double most) {
+double LargestUnfoldedRadius(const Camera& own, double most) {
   constexpr int kDirections = 32, kSteps = 1000;
   double u0 = 0, v0 = 0;
   own.Project({0, 0, 1}, &u0, &v0);
@@ -73,7 +73,7 @@ Image UndistortPhoto(const Image& photo, const Camera& camera) {
   Image result(photo.width, photo.height, photo.channels);
   const double farthest = std::hypot(std::max(plain.cx, plain.width - plain.cx) / plain.fx,
                                      std::max(plain.cy, plain.height - plain.cy) / plain.fy);
-  const double fold = FoldRadius(own, farthest * 1.01);
+  const double fold = LargestUnfoldedRadius(own, farthest * 1.01);
 #pragma omp parallel for schedule(dynamic, 4)
   for (int y = 0; y < photo.height; ++y)
     for (int x = 0; x < photo.width; ++x) {

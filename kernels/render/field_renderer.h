@@ -13,11 +13,13 @@ namespace regrade {
 
 class FieldRenderer {
  public:
-  // Takes the field over: move one that nobody else needs. Throws Error(kResources) where the
-  // GPU's memory is too small.
-  FieldRenderer(RadianceField field, Backend backend) {
+  // Copies what it needs, or takes the field over where that saves a copy. Throws
+  // Error(kResources) where the GPU's memory is too small.
+  FieldRenderer(const RadianceField& field, Backend backend)
+      : renderer_(RenderKindOf(*field.geometry).make_renderer(field, backend)) {}
+  FieldRenderer(RadianceField&& field, Backend backend) {
     const RenderKind& kind = RenderKindOf(*field.geometry);
-    renderer_ = kind.make_renderer(std::move(field), backend);
+    renderer_ = kind.take_field(std::move(field), backend);
   }
 
   // In single precision, every sample. A field of splats has no picture through a lens:

@@ -1,4 +1,4 @@
-// Renders one kind of field on one processor; see FieldRenderer, which has one of two.
+// Renders one kind of field on one processor; see FieldRenderer, which owns one.
 #pragma once
 
 #include "kernels/field/cpu/render_view.h"

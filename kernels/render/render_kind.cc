@@ -9,10 +9,10 @@
 namespace regrade {
 
 const RenderKind& RenderKindOf(const Geometry& geometry) {
-  static constexpr RenderKind kOfVoxels{MakeVoxelRenderer, MakeVoxelWeigher, VoxelDepths,
-                                        VoxelDepthAlong};
-  static constexpr RenderKind kOfSplats{MakeSplatRenderer, MakeSplatWeigher, SplatDepths,
-                                        SplatDepthAlong};
+  static constexpr RenderKind kOfVoxels{MakeVoxelRenderer, TakeVoxels, MakeVoxelWeigher,
+                                        VoxelDepths, VoxelDepthAlong};
+  static constexpr RenderKind kOfSplats{MakeSplatRenderer, TakeSplats, MakeSplatWeigher,
+                                        SplatDepths, SplatDepthAlong};
   return geometry.splats.on() ? kOfSplats : kOfVoxels;
 }
 

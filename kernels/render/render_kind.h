@@ -1,4 +1,4 @@
-// What light does in a field, of each kind: makes renderers and weighers.
+// Makes renderers and weighers for each kind of field.
 #pragma once
 
 #include <cstdint>
@@ -12,7 +12,8 @@
 namespace regrade {
 
 struct RenderKind {
-  std::unique_ptr<KindRenderer> (*make_renderer)(RadianceField field, Backend backend);
+  std::unique_ptr<KindRenderer> (*make_renderer)(const RadianceField& field, Backend backend);
+  std::unique_ptr<KindRenderer> (*take_field)(RadianceField&& field, Backend backend);
   // See MakeRayWeigher, RayDepths and OpticalDepths.
   std::unique_ptr<RayWeigher> (*make_weigher)(const Geometry& geometry, float near_clip,
                                               const MarchOptions& march, int64_t kept_bytes);

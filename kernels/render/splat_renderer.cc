@@ -93,8 +93,13 @@ class CudaSplatRenderer : public SplatRenderer {
 
 }  // namespace
 
-std::unique_ptr<KindRenderer> MakeSplatRenderer(RadianceField field, Backend backend) {
+std::unique_ptr<KindRenderer> MakeSplatRenderer(const RadianceField& field, Backend backend) {
   if (backend == Backend::kCuda) return std::make_unique<CudaSplatRenderer>(field);
+  return std::make_unique<CpuSplatRenderer>(field);
+}
+
+std::unique_ptr<KindRenderer> TakeSplats(RadianceField&& field, Backend backend) {
+  if (backend == Backend::kCuda) return MakeSplatRenderer(field, backend);
   return std::make_unique<CpuSplatRenderer>(std::move(field));
 }
 

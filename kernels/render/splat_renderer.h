@@ -9,6 +9,7 @@
 
 namespace regrade {
 
-std::unique_ptr<KindRenderer> MakeSplatRenderer(RadianceField field, Backend backend);
+std::unique_ptr<KindRenderer> MakeSplatRenderer(const RadianceField& field, Backend backend);
+std::unique_ptr<KindRenderer> TakeSplats(RadianceField&& field, Backend backend);
 
 }  // namespace regrade

@@ -1,5 +1,7 @@
 #include "kernels/render/voxel_renderer.h"
 
+#include <utility>
+
 #include "kernels/base/error.h"
 #include "kernels/field/cuda/device_grid.h"
 #include "kernels/field/cuda/device_rays.h"
@@ -43,8 +45,13 @@ class VoxelRenderer : public KindRenderer {
 
 }  // namespace
 
-std::unique_ptr<KindRenderer> MakeVoxelRenderer(RadianceField field, Backend backend) {
+std::unique_ptr<KindRenderer> MakeVoxelRenderer(const RadianceField& field, Backend backend) {
   return std::make_unique<VoxelRenderer>(field, backend);
+}
+
+std::unique_ptr<KindRenderer> TakeVoxels(RadianceField&& field, Backend backend) {
+  const RadianceField taken = std::move(field);
+  return MakeVoxelRenderer(taken, backend);
 }
 
 }  // namespace regrade

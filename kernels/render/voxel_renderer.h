@@ -9,6 +9,7 @@
 
 namespace regrade {
 
-std::unique_ptr<KindRenderer> MakeVoxelRenderer(RadianceField field, Backend backend);
+std::unique_ptr<KindRenderer> MakeVoxelRenderer(const RadianceField& field, Backend backend);
+std::unique_ptr<KindRenderer> TakeVoxels(RadianceField&& field, Backend backend);
 
 }  // namespace regrade

@@ -1,6 +1,7 @@
 // Splats at one pixel, front to back, and their adjoint.
 //
-// EQ(splat-composite), Kerbl et al. 2023, eq. 3: for alpha_i see EQ(splat-opacity);
+// EQ(splat-composite), Kerbl et al. 2023, eq. 3: for alpha_i see EQ(splat-opacity), for c_i
+// EQ(splat-color);
 //   T_0 = 1,  w_i = T_i alpha_i,  T_{i+1} = T_i (1 - alpha_i),
 //   C = sum_i w_i c_i + T_N c_bg,   Z = sum_i w_i z_i,   sum_i w_i + T_N = 1.
 // The splat after which T would be below 1e-4, and all behind it, are left out. Z over 1 - T_N

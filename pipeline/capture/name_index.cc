@@ -2,31 +2,16 @@
 
 #include <algorithm>
 #include <filesystem>
-#include <numeric>
+#include <limits>
 
 #include "pipeline/files/text.h"
+#include "pipeline/program/nearest_name.h"
 
 namespace regrade {
 namespace {
 
 constexpr size_t kMostCompared = 20000;  // names; each costs its length squared
 constexpr size_t kLongestCompared = 200;
-
-// Characters to insert, to remove or to change.
-size_t EditDistance(const std::string& a, const std::string& b) {
-  std::vector<size_t> row(b.size() + 1);
-  std::iota(row.begin(), row.end(), size_t{0});
-  for (size_t i = 0; i < a.size(); ++i) {
-    size_t diagonal = row[0];
-    row[0] = i + 1;
-    for (size_t j = 0; j < b.size(); ++j) {
-      const size_t changed = diagonal + (a[i] == b[j] ? 0 : 1);
-      diagonal = row[j + 1];
-      row[j + 1] = std::min({row[j] + 1, row[j + 1] + 1, changed});
-    }
-  }
-  return row[b.size()];
-}
 
 void Insert(const std::string& key, const std::string& name,
             std::map<std::string, std::string>* names) {
@@ -84,10 +69,9 @@ std::string NameIndex::Find(const std::string& wanted) const {
 std::string NameIndex::Nearest(const std::string& wanted) const {
   const std::string plain = LowerCase(WithSlashes(wanted)).substr(0, kLongestCompared);
   std::string nearest;
-  size_t least = ~size_t{0};
+  int least = std::numeric_limits<int>::max();
   for (size_t i = 0; i < std::min(names_.size(), kMostCompared); ++i) {
-    const size_t distance =
-        EditDistance(plain, LowerCase(names_[i]).substr(0, kLongestCompared));
+    const int distance = EditDistance(plain, LowerCase(names_[i]).substr(0, kLongestCompared));
     if (distance >= least) continue;
     least = distance;
     nearest = names_[i];

@@ -24,8 +24,8 @@ struct SceneProfile {
   // "background": much of the scene is far beyond what the cameras surround
   //   (normalize_scene.h); it is modelled on spheres outside the box, or by far splats.
   // "view-dependence": colours change with direction, up to `sh_degree`; the fit's trial
-  // decides. "exposure": photos differ in brightness or white balance by more than noise
-  // explains, and
+  //   decides.
+  // "exposure": photos differ in brightness or white balance by more than noise explains, and
   //   undoing that improves held-out points (exposure.h).
   std::vector<EffectReport> effects;
   NormalizedScene scene;

@@ -1,4 +1,4 @@
-// Reads and writes field.npz and styled.npz: a radiance field in the layout of svox2's
+// Reads and writes field.npz: a radiance field in the layout of svox2's
 // checkpoints, with additional arrays.
 //
 // svox2's: radius f32[3], center f32[3], links i32[X,Y,Z], density_data f32[N,1], sh_data

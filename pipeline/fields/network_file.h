@@ -1,4 +1,4 @@
-// network.npz: the Lipschitz network that made styled.npz, with the bound guaranteed for it.
+// network.npz: the Lipschitz network of a style, with the bound guaranteed for it.
 //
 // For layers l = 0..5: weight_l f32[out, in], bias_l f32[out], k_l f32 (before squareplus), u_l
 // f32[out] and v_l f32[in] (the running singular vectors). For the whole: activation u8[]

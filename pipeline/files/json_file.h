@@ -86,17 +86,6 @@ std::string PlaceIn(const std::string& path, const JsonValue& at);
 JsonValue ReadJsonFile(const std::string& path, uint64_t max_bytes = 64 << 20,
                        ExitCode code = ExitCode::kInput);
 
-// What `read` returns; an Error of it that names no place gets `where`.
-template <typename Read>
-auto InFile(const std::string& where, const Read& read) {
-  try {
-    return read();
-  } catch (const Error& error) {
-    if (!error.where().empty()) throw;
-    throw Error(error.code(), error.what_failed(), where, error.hint());
-  }
-}
-
 // Doubles get the shortest text that reads back exactly. indent < 0: everything on one line.
 // Invalid UTF-8 becomes replacement characters.
 std::string DumpJson(const JsonValue& value, int indent = 1);

@@ -16,7 +16,7 @@
 
 namespace regrade {
 
-// See EncodeField, DecodeField, VoxelsInPageOrder and ColorWeights.
+// See EncodeField, DecodeField, RecordsInPageOrder and ColorWeights.
 PageField EncodeSplats(const RadianceField& field, double step);
 RadianceField DecodeSplats(const PageField& page);
 PageVoxels SplatsInPageOrder(const PageField& page, const Geometry& geometry);

@@ -135,10 +135,8 @@ Part Faithful(const RunReport& report) {
                                              : "apart in places");
   part.grade = *psnr.value / 30;
   part.advice = edit ? "edit a photo that shows more of what is to change, seen from nearby"
-                     : "the constant style-view-weight (--config), 0, follows each recoloured "
-                       "view more closely, "
-                       "and is less "
-                       "steady";
+                     : "--config '{\"style-view-weight\": 0}' follows each recoloured view "
+                       "more closely, and is less steady";
   return part;
 }
 

@@ -112,8 +112,7 @@ struct ReconstructReport {
   std::string sharpness;             // SharpnessWord of detail_kept, held out, or else training
   std::vector<std::string> heldout;  // the user's file names
   Curve psnr_at_steps;               // dB on the rays of the last steps
-  // Of the trial that decides for or against view dependence.
-  std::optional<RefineReport> refined;
+  std::optional<RefineReport> refined;  // of a field that was refined in blocks
 
   template <typename Visit>
   void Describe(Visit& visit) {

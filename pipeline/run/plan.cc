@@ -201,7 +201,7 @@ void CheckFitsMemory(const StagePlan& plan, uint64_t limit, const char* memory) 
   throw ResourceError("the fit would take about " +
                           MemoryText(static_cast<double>(plan.memory)) + " of " + memory +
                           ", the limit is " + MemoryText(static_cast<double>(limit)),
-                      "reconstruct", "use --preset draft or fewer --splats");
+                      "reconstruct", "use --preset draft");
 }
 
 bool LowerToMemory(const std::function<StagePlan(const FitOptions&)>& plan_of, uint64_t limit,

@@ -24,12 +24,13 @@ void CheckSchema(const JsonValue& run) {
       "", "run again with another --out, or delete the output folder");
 }
 
-// Options of the fits of earlier versions, which every run.json of theirs names; and what a
-// rate or weight of theirs could be instead of a number.
+// Options of earlier versions, which every run.json of theirs names; and what a rate or weight
+// of theirs could be instead of a number.
 constexpr std::array kEarlierOptions = {
-    "fit-field",     "fit-fewer-stages",      "fit-cell-pixels",
-    "fit-max-cells", "fit-max-forward-cells", "fit-outward",
-    "fit-free-space"};
+    "exact",          "fit-cell-pixels", "fit-fewer-stages",      "fit-field",
+    "fit-free-space", "fit-max-cells",   "fit-max-forward-cells", "fit-outward",
+    "keep-field",     "style-embedding", "style-features",        "style-iterations",
+    "style-regrain"};
 constexpr std::array kEarlierAuto = {"fit-rate-density", "fit-rate-density-end", "tv-density",
                                      "tv-sh"};
 

@@ -54,7 +54,8 @@ std::vector<FrameUnit> UnitsOfPart(const std::vector<FrameUnit>& units,
 std::vector<std::vector<FrameUnit>> BatchesWithin(const std::vector<FrameUnit>& units,
                                                   int64_t splats, uint64_t memory) {
   constexpr uint64_t kProgramBytes = 150'000'000, kSplatBytes = 400;
-  if (memory == 0 || kProgramBytes + kSplatBytes * static_cast<uint64_t>(splats) <= memory)
+  if (splats == 0 || memory == 0 ||
+      kProgramBytes + kSplatBytes * static_cast<uint64_t>(splats) <= memory)
     return {units};
   std::vector<std::vector<FrameUnit>> each;
   for (const FrameUnit& unit : units) each.push_back({unit});

@@ -30,8 +30,8 @@ std::vector<FrameUnit> UnitsOfPart(const std::vector<FrameUnit>& units,
                                    const std::string& part);
 
 // Units that are rendered from one field: all, where `splats` and what renders them fit into
-// `memory` bytes (0 where there is no limit), else each by itself, from the splats in its
-// pictures.
+// `memory` bytes (0: not known) or there are voxels (`splats` is 0), else each by itself, from
+// the splats in its pictures.
 std::vector<std::vector<FrameUnit>> BatchesWithin(const std::vector<FrameUnit>& units,
                                                   int64_t splats, uint64_t memory);
 

@@ -11,7 +11,6 @@
 #include "pipeline/capture/working_views.h"
 #include "pipeline/fields/field_file.h"
 #include "pipeline/files/text.h"
-#include "pipeline/program/cpu_time.h"
 #include "pipeline/program/device_choice.h"
 #include "pipeline/report/stage_metrics.h"
 #include "pipeline/run/fit_kind.h"
@@ -104,12 +103,11 @@ EffectReport ProfileViewDependence(const RunSettings& settings, FieldFit* fit,
 void RequireEnough(const Capture& capture, int least, const std::string& poses) {
   const int64_t count = std::ssize(capture.views);
   if (count < least)
-    throw SceneError(
-        Concat(Counted(count, "photo"), " with a pose, and a scene in 3D needs at least ",
-               least),
-        poses,
-        Concat("give poses of more photos; the constant pose-min-photos (--config), ", count,
-               ", tries with fewer"));
+    throw SceneError(Concat(Counted(count, "photo"),
+                            " with a pose, and a scene in 3D needs at least ", least),
+                     poses,
+                     Concat("give poses of more photos; --config '{\"pose-min-photos\": ",
+                            count, "}' tries with fewer"));
 }
 
 StageOutcome Reconstruct(RunContext* context, const JsonValue& inputs,

@@ -13,7 +13,7 @@
 
 namespace regrade {
 
-// Renders units, each after `begin(unit)`, from the field or, where it does not fit into
+// Calls `render` for each unit, once `frames` shows the field or, where it does not fit into
 // memory, from the parts of it that they see. `geometry`: of ReadFieldGeometry.
 void RenderUnits(const std::vector<FrameUnit>& units, StoredField geometry,
                  const RunContext& context, SceneFrames* frames,

@@ -45,6 +45,7 @@ void SayPlan(const FramePlan& plan, const RenderOptions& options, Console* conso
 // styled.ply of splats that were given.
 void WriteStyledField(const RunContext& context, std::vector<std::string>* outputs) {
   const Workspace& style = *context.style;
+  std::filesystem::remove(style.Path("styled.npz"));  // of an earlier version
   if (!HasGivenSplats(context)) {
     std::filesystem::remove(style.Path(kStyledSplats));  // of an earlier style
     return;
@@ -76,7 +77,9 @@ JoinedParts RenderAll(const FramePlan& plan, StoredField geometry, RunContext* c
                  plan.film_of_views() ? options.fps : kSampleRate);
   {
     FrameWriter writer(folder, ParseVignette(options.vignette), &films);
+    bool begun = false;
     RenderUnits(units, std::move(geometry), *context, frames, [&](const FrameUnit& unit) {
+      if (!std::exchange(begun, true)) RemoveFrames(plan, *context->style);
       RenderUnit(
           unit, *seen, tick, [&](SampledView view) { seen->Add(std::move(view)); }, frames,
           &writer);
@@ -121,9 +124,9 @@ StageOutcome Render(const JsonValue& inputs, RunContext* context,
   StageOutcome outcome;
   outcome.outputs = {"frames"};
   SayPlan(plan, settings.render, console);
-  RemoveFrames(plan, style);
   JoinedParts rendered;
   if (context->parts.join) {
+    RemoveFrames(plan, style);
     rendered = JoinParts(inputs, plan, context, &seen);
   } else {
     SceneFrames frames(context, plan);

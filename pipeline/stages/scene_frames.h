@@ -43,7 +43,7 @@ class SceneFrames {
   // Keeps references to `context` and `plan`.
   SceneFrames(RunContext* context, const FramePlan& plan);
 
-  // The scene's field, or the part of it that the next frames see, see FieldFor.
+  // The scene's field, or the part of it that the next frames see, see SeenPart.
   void Show(StoredField before);
 
   Frame Render(const FrameSet& set, int index);

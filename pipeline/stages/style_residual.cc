@@ -67,7 +67,7 @@ class ResidualFit {
                          const ProgressFunction& progress) const {
     RadianceField styled = styled_.field;
     if (!so_far.color.empty()) AddResidual(so_far, &styled.appearance);
-    const FieldRenderer of_styled(styled, backend_);
+    const FieldRenderer of_styled(std::move(styled), backend_);
     const int64_t most = kMostResidualRays / std::max<int64_t>(1, std::ssize(indices));
     ResidualRays rays;
     ProgressParts parts(progress, 2);

@@ -92,8 +92,7 @@ StageOutcome KeepColors(RunContext* context, const Vec3f& background,
   const Workspace& folder = *context->style;
   context->console->Warn(
       "the masks agree on no part of the scene: it keeps its colours. Check --masks, or lower "
-      "the "
-      "constant mask-vote (--config)");
+      "the constant mask-vote (--config)");
   WriteNetworkFile(folder.Path("network.npz"), {NetworkOfMap({}), 0, background});
   WriteObjectFile(folder.Path("object.npz"), weights);
   StageOutcome outcome;
@@ -151,7 +150,7 @@ StageOutcome Stylize(RunContext* context, const JsonValue& inputs,
                                     (settings.residual.On() ? kOfResidual : 0));
   TrainedField trained_on =
       ReadTrainedField(*context, std::move(geometry), views, StyledViews(workspace, views));
-  if (!trained_on.notice.empty()) context->console->Info(trained_on.notice);
+  if (!trained_on.notice.empty()) context->console->Warn(trained_on.notice);
   StoredField& stored = trained_on.stored;
   const std::vector<int>& indices = trained_on.views;
   const std::unique_ptr<ObjectMasks> object = OpenObjectMasks(settings, views);
@@ -243,6 +242,9 @@ Stage StylizeStage(RunContext* context) {
       {"options", OptionValues(context->settings.scene, context->settings.network)},
       {"seed", run.seed},
       {"holdout", run.holdout}};
+  const std::string field = context->workspace->Path("field.npz");
+  if (std::filesystem::exists(field) && IsTrainedOnAPart(context->settings, CountSplats(field)))
+    stage.inputs["max-memory"] = run.max_memory_gb;
   if (context->settings.object.On()) {
     stage.inputs["object"] = OptionValues(context->settings.object);
     stage.inputs["masks"] = MaskFiles(context->settings.object);

@@ -9,7 +9,6 @@
 #include "kernels/splats/splat_field.h"
 #include "pipeline/fields/seen_field.h"
 #include "pipeline/files/text.h"
-#include "pipeline/program/memory.h"
 #include "pipeline/run/plan.h"
 
 namespace regrade {
@@ -18,6 +17,7 @@ namespace {
 constexpr uint64_t kTrainingBytes = 150'000'000;
 constexpr uint64_t kGeometryBytes = 60;  // a splat of the file, while it is read
 constexpr uint64_t kTrainedBytes = 450;  // a splat that is trained on
+constexpr uint64_t kPictureBytes = 12;   // a pixel of a photo and its target
 
 // 0 .. count - 1, each further one in the middle of the largest gap.
 std::vector<int> Spread(int count) {
@@ -29,14 +29,14 @@ std::vector<int> Spread(int count) {
   return order;
 }
 
-bool Fits(const RunContext& context, int64_t splats, uint64_t memory) {
-  const RunSettings& settings = context.settings;
-  if (splats == 0 || settings.object.On() || settings.residual.On()) return true;
-  if (settings.run.reproducible && settings.run.max_memory_gb <= 0) return true;
-  return kTrainingBytes + kTrainedBytes * static_cast<uint64_t>(splats) <= memory;
-}
-
 }  // namespace
+
+bool IsTrainedOnAPart(const RunSettings& settings, int64_t splats) {
+  if (settings.run.max_memory_gb <= 0 || settings.object.On() || settings.residual.On())
+    return false;
+  return kTrainingBytes + kTrainedBytes * static_cast<uint64_t>(splats) >
+         PlannedMemory(settings.run.max_memory_gb, 0);
+}
 
 std::vector<int> CamerasWithin(uint64_t memory, const RadianceField& splats,
                                const std::vector<Camera>& cameras) {
@@ -46,8 +46,10 @@ std::vector<int> CamerasWithin(uint64_t memory, const RadianceField& splats,
   uint64_t bytes = all;
   std::vector<int> within;
   for (const int i : Spread(static_cast<int>(cameras.size()))) {
-    const std::vector<uint8_t> more =
-        SeenSplats(view, {cameras[static_cast<size_t>(i)]}, SplatOptionsOf(splats));
+    const Camera& camera = cameras[static_cast<size_t>(i)];
+    bytes += kPictureBytes * static_cast<uint64_t>(camera.width) *
+             static_cast<uint64_t>(camera.height);
+    const std::vector<uint8_t> more = SeenSplats(view, {camera}, SplatOptionsOf(splats));
     for (size_t k = 0; k < seen.size(); ++k) {
       if (more[k] > seen[k]) bytes += kTrainedBytes;
       seen[k] |= more[k];
@@ -63,15 +65,14 @@ TrainedField ReadTrainedField(const RunContext& context, StoredField geometry,
                               const WorkingViews& views, std::vector<int> indices) {
   const std::string path = context.workspace->Path("field.npz");
   const int64_t splats = CountSplats(path);
-  const uint64_t memory =
-      PlannedMemory(context.settings.run.max_memory_gb, ReadMemoryStatus().available);
-  if (Fits(context, splats, memory)) {
+  if (!IsTrainedOnAPart(context.settings, splats)) {
     geometry = {};
     return {ReadFieldFile(path), std::move(indices), ""};
   }
   std::vector<Camera> cameras;
   for (const int i : indices) cameras.push_back(views.CameraOf(i));
-  const std::vector<int> within = CamerasWithin(memory, geometry.field, cameras);
+  const std::vector<int> within = CamerasWithin(
+      PlannedMemory(context.settings.run.max_memory_gb, 0), geometry.field, cameras);
   TrainedField trained;
   for (const int k : within) trained.views.push_back(indices[static_cast<size_t>(k)]);
   std::vector<Camera> chosen;
@@ -80,7 +81,7 @@ TrainedField ReadTrainedField(const RunContext& context, StoredField geometry,
   trained.notice = Concat("the style is learned from ", trained.views.size(), " of ",
                           Counted(std::ssize(indices), "photo"), ", which show ",
                           trained.stored.field.geometry->num_voxels(), " of ", splats,
-                          " splats: that is what fits into memory");
+                          " splats, to fit into --max-memory");
   return trained;
 }
 

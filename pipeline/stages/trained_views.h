@@ -11,8 +11,9 @@
 
 namespace regrade {
 
-// `cameras`, evenly among them, as many as see few enough of the `splats` that these fit into
-// `memory` bytes while a style is trained; one at least. In their order.
+// `cameras`, evenly among them, as many as see few enough of the `splats` that these and the
+// cameras' pictures fit into `memory` bytes while a style is trained; one at least. In their
+// order.
 std::vector<int> CamerasWithin(uint64_t memory, const RadianceField& splats,
                                const std::vector<Camera>& cameras);
 
@@ -22,8 +23,13 @@ struct TrainedField {
   std::string notice;  // of what was left out; else empty
 };
 
+// Whether a style of a field with so many splats is trained on a part of it: where the whole
+// does not fit into --max-memory. What is free decides nothing: the same command makes the same
+// style. A style of an object, or with a residual, knows all splats.
+bool IsTrainedOnAPart(const RunSettings& settings, int64_t splats);
+
 // `geometry`: of ReadFieldGeometry. `views`: in the field's frame; `indices`: those with a
-// picture. A style of an object, or with a residual, knows all splats.
+// picture.
 TrainedField ReadTrainedField(const RunContext& context, StoredField geometry,
                               const WorkingViews& views, std::vector<int> indices);
 

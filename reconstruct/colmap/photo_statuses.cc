@@ -122,8 +122,8 @@ void RequirePoses(const Capture& capture, const std::vector<StagedPhoto>& photos
     throw SceneError(Concat(have, ", and a scene in 3D needs at least ", options.min_photos),
                      poses,
                      remedy + (count < 2 ? std::string()
-                                         : Concat("; the constant pose-min-photos (--config), ",
-                                                  count, ", tries with fewer")));
+                                         : Concat("; --config '{\"pose-min-photos\": ", count,
+                                                  "}' tries with fewer")));
   const double least = options.min_registered * static_cast<double>(all);
   if (static_cast<double>(count) < least)
     throw SceneError(have + Format(", and at least %.0f are needed", std::ceil(least)), poses,

@@ -14,6 +14,7 @@
 #include "kernels/field/spherical_harmonics.h"
 #include "kernels/splats/splat_field.h"
 #include "reconstruct/splats/initial_splats.h"
+#include "reconstruct/splats/population.h"
 #include "reconstruct/splats/splat_engine.h"
 
 namespace regrade {

@@ -62,7 +62,7 @@ struct SplatFitHooks {
 };
 
 // With fewer than 15000 steps, rates of means, scales and colours and the growth are larger by
-// the 0.3th power of the ratio, and the last rate of means by the ratio, up to 10.
+// the ratio to the power 0.3, and the last rate of means by the ratio, up to 10.
 // Throws Error(kScene) if no place of the box is seen by two photos, Interrupted after kStop
 // (after calling `checkpoint`).
 SplatFitResult FitSplats(const std::vector<TrainingView>& views, const SceneBox& box,

@@ -1,4 +1,4 @@
-// Where the splats of a scene are that is not known otherwise.
+// Centre and radii of a scene of splats.
 #pragma once
 
 #include <cstdint>

@@ -191,7 +191,7 @@ double LipschitzNetwork::BaseNorm() const {
   return data_.has_base ? SpectralNorm(data_.base.matrix) : 0;
 }
 
-double LipschitzNetwork::ResidualBound() const {
+double LipschitzNetwork::LearnedBound() const {
   const DenseNetwork<double> network = Effective<double>();
   double bound =
       std::pow(ActivationLipschitz(network.activation, network.omega), kNetworkLayers - 1);

@@ -94,8 +94,8 @@ class LipschitzNetwork {
 
   // See EQ(liprf-bound): its two parts, and the largest sigma / sigma_hat - 1 of a layer.
   double BaseNorm() const;
-  double ResidualBound() const;
-  double Bound() const { return BaseNorm() + ResidualBound(); }
+  double LearnedBound() const;
+  double Bound() const { return BaseNorm() + LearnedBound(); }
   double NormDrift() const;
   // sigma_hat of a layer's W, from the running singular vectors.
   double NormEstimate(int layer) const;

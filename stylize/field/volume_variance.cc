@@ -43,7 +43,7 @@ class Observer {
         has_base_(network.data().has_base),
         position_scale_(network.data().position_scale),
         base_norm_(network.BaseNorm()),
-        residual_bound_(network.ResidualBound()) {
+        residual_bound_(network.LearnedBound()) {
     REGRADE_CHECK(source.geometry == styled.geometry);
     REGRADE_CHECK_EQ(basis_, styled.appearance.basis);
     vertex_ = VertexOfVoxel(*source.geometry);

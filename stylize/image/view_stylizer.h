@@ -1,4 +1,4 @@
-// The seam between the pipeline and any 2D method that restyles one view at a time.
+// The interface between the pipeline and any 2D method that restyles one view at a time.
 #pragma once
 
 #include <cstdint>
@@ -39,7 +39,7 @@ class ViewStylizer {
 // `where`. The few below it leave every loss and every measure.
 int64_t CountNotFinite(const Image& image, const std::string& where);
 
-// What Stylize guarantees, for methods that are not ours: same size and channels, and
+// For tests, what Stylize guarantees of any method: same size and channels, and
 // CountNotFinite, which is returned. Throws Error(kExternalProgram) naming `where`.
 int64_t CheckStyledView(const Image& view, const Image& styled, const std::string& where);
 

@@ -157,7 +157,7 @@ void SolveOutputLayer(const StyleLoss::HiddenSums& sums, double budget,
   network->weight(kLast)[0] = 1;
   network->k(kLast) = 1;
   network->WarmUpNorms();
-  const double hidden_bound = network->ResidualBound();
+  const double hidden_bound = network->LearnedBound();
   ClearLastLayer(network);
   for (double ridge = 1e-6; ridge < 1e6; ridge *= 2) {
     Eigen::MatrixXd system = gram;

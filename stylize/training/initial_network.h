@@ -34,7 +34,7 @@ void ClearLastLayer(LipschitzNetwork* network);
 
 // Sets the last layer's constant coefficients (degree 0) by a ridge regression: what the colour
 // map leaves missing, explained by the sums of hidden activations along rays. Of ridges growing
-// from nearly none, the first whose ResidualBound() is within `budget`.
+// from nearly none, the first whose LearnedBound() is within `budget`.
 //
 // EQ(output-layer): min over W [3, 64], b [3] of
 //   sum_r |missing_r - Gamma_0 (W h_r + b O_r)|^2 + ridge n |W|^2,  O_r = 1 - T_r.

@@ -212,7 +212,7 @@ StepResult Training::Advance(int64_t most) {
 TrainNetworkResult Training::Conclude() {
   if (options_.settle_norms) network_.WarmUpNorms();
   // The power iteration's norms are a little low; the guarantee is about exact ones.
-  const double excess = network_.ResidualBound() / update_.bound_limit;
+  const double excess = network_.LearnedBound() / update_.bound_limit;
   if (excess > 1) network_.k(kNetworkLayers - 1) *= static_cast<float>((1 - 1e-6) / excess);
   double mse = LossOfSample(network_).Mse();
   if (network_.data().has_base && !(mse <= state_.linear_map_mse)) {

@@ -201,6 +201,7 @@ TEST(ResolveSettings, OptionsOfEarlierVersionsAreDropped) {
   const std::string run = folder / "run.json";
   const std::string earlier =
       R"("fit-field": "adaptive", "fit-fewer-stages": true, "fit-cell-pixels": 1, )"
+      R"("exact": false, "keep-field": true, "style-regrain": false, "style-features": "", )"
       R"("fit-max-cells": 5, "fit-max-forward-cells": 12, "fit-outward": 2, )"
       R"("fit-free-space": "auto", "fit-rate-density": "auto", "fit-rate-density-end": "auto", )"
       R"("tv-density": "auto", "tv-sh": "auto", "tv-decay": 0.7, "fit-rate-sh": 0.05, )"

@@ -132,7 +132,7 @@ TEST(LipschitzNetwork, H44_OmegaMultipliesTheBoundOnceALayer) {
 
 TEST(LipschitzNetwork, BaseMapCountsWithItsNorm) {
   const LipschitzNetwork network = NetworkOfMap(SomeMap());
-  EXPECT_EQ(network.ResidualBound(), 0);
+  EXPECT_EQ(network.LearnedBound(), 0);
   EXPECT_NEAR(network.Bound(), SpectralNorm(SomeMap().matrix), 1e-12);
   const LocalLipschitz slopes =
       MeasureLocalLipschitz(network, Ball(12), {.pairs = 2000, .jacobians = 5});

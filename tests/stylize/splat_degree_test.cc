@@ -47,7 +47,7 @@ TEST(SplatsOfDegreeThree, H36_NoPairIsSteeperThanTheBound) {
       TrainNetwork(ball.field, ball.views, MapOf(ball), options, {}).network;
   ASSERT_EQ(network.row().basis, 16);
   const double bound = network.Bound();
-  EXPECT_GT(network.ResidualBound(), 0.1 * bound);
+  EXPECT_GT(network.LearnedBound(), 0.1 * bound);
   double steepest = 0, in_pictures = 0;
   ForRandomPairs(
       network, pairs,
