@@ -219,7 +219,7 @@ class Supervisor:
 
     def blocks_with_kills(self):
         """Refines a finished field in blocks, two at a time, each killed at random times until all are made."""
-        refine = ["--blocks", "3", "--splats", "4", "--splat-steps", "1200"]
+        refine = ["--blocks", "3", "--splats", "4", "--splat-steps", "400"]
         self.reset(self.posed)
         self.complete(self.command(more=("--until", "stylize")), ["pose"])
         alone = os.path.join(self.scratch, "refined")
