@@ -48,13 +48,16 @@ constexpr StageEntry kStages[] = {
     // stylize/field/gradient_aggregation.h, its bound in stylize/field/lipschitz_network.h
     {"stylize", StylizeStage},
     // field.npz + network.npz -> frames/ (a pixel of splats in kernels/splats/compositing.h,
-    // their colours in kernels/splats/splat_color.h, a ray through voxels in kernels/field/render_ray.h), films (pipeline/images/video_writer.h)
+    // their colours in kernels/splats/splat_color.h, a ray through voxels in
+    // kernels/field/render_ray.h), films (pipeline/images/video_writer.h), whose way keeps out
+    // of surfaces (pipeline/fields/path_clearance.h)
     {"render", RenderStage},
     // frames/ -> consistency (evaluate/consistency.h) and fidelity (evaluate/fidelity.h)
     // metrics, heatmaps/
     {"evaluate", EvaluateStage},
     // all records -> report.json, report.html (pipeline/report); the scene -> scene.html, a
-    // page to walk in (pipeline/page/make_page.h)
+    // page to walk in (pipeline/page/make_page.h; splats in splat_codec.h, styles in
+    // style_codec.h)
     {"report", ReportStage},
 };
 // clang-format on

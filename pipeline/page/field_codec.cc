@@ -19,7 +19,7 @@ struct KindCodec {
   PageField (*encode)(const RadianceField& field, double step);
   RadianceField (*decode)(const PageField& page);
   std::optional<RadianceField> (*coarse)(const RadianceField& field);
-  PageVoxels (*in_page_order)(const PageField& page, const Geometry& geometry);
+  PageRecords (*in_page_order)(const PageField& page, const Geometry& geometry);
   std::vector<float> (*color_weights)(const Geometry& geometry);
 };
 
@@ -57,7 +57,7 @@ std::optional<PageField> EncodeCoarse(const RadianceField& field, double step) {
   return EncodeField(*coarse, step);
 }
 
-PageVoxels RecordsInPageOrder(const PageField& page, const Geometry& geometry) {
+PageRecords RecordsInPageOrder(const PageField& page, const Geometry& geometry) {
   return CodecOf(page).in_page_order(page, geometry);
 }
 

@@ -46,11 +46,11 @@ std::optional<PageField> EncodeCoarse(const RadianceField& field, double step);
 
 // The records of a page in its order: which they are in `geometry`, that of the field that was
 // encoded or decoded, and from which others they are predicted.
-struct PageVoxels {
+struct PageRecords {
   std::vector<int64_t> voxel;
-  std::vector<EarlierVoxels> earlier;
+  std::vector<EarlierRecords> earlier;
 };
-PageVoxels RecordsInPageOrder(const PageField& page, const Geometry& geometry);
+PageRecords RecordsInPageOrder(const PageField& page, const Geometry& geometry);
 
 // "voxels" or "splats".
 const char* RecordsName(const PageField& page);

@@ -41,7 +41,7 @@ struct MadePage {
   std::vector<int64_t> style_bytes;
   std::vector<std::string> report;  // what is left out, at what cost, and the lines of --check
   RadianceField field;              // as the page has it
-  PageVoxels places;                // its records, as the page orders them
+  PageRecords places;               // its records, as the page orders them
 };
 
 // `styles`: names in `folder`; with what they add voxel by voxel. Where most_bytes do not hold

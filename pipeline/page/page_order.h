@@ -20,11 +20,11 @@ inline constexpr int kMaxPageSide = 1 << 20;  // of the box, voxels
 inline constexpr int64_t kMaxPageVoxels = int64_t{1} << 26;
 
 // Up to three earlier voxels, numbered in the page's order; -1: fewer.
-using EarlierVoxels = std::array<int32_t, 3>;
+using EarlierRecords = std::array<int32_t, 3>;
 
 struct PageOrder {
-  std::vector<Vec3i> place;            // [V]: vertex of the grid
-  std::vector<EarlierVoxels> earlier;  // [V]
+  std::vector<Vec3i> place;             // [V]: vertex of the grid
+  std::vector<EarlierRecords> earlier;  // [V]
 };
 
 // A bit for each brick of kPageBrick^3 vertices (z fastest, the lowest bit first), and behind

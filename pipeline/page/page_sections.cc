@@ -11,7 +11,7 @@ namespace regrade {
 namespace {
 
 // The mean of a coefficient over a record's earlier neighbours, 0 without any.
-float EarlierMean(const ColorRows& rows, const EarlierVoxels& earlier, int coefficient) {
+float EarlierMean(const ColorRows& rows, const EarlierRecords& earlier, int coefficient) {
   float sum = 0, n = 0;
   for (const int32_t other : earlier)
     if (other >= 0) sum += rows[static_cast<size_t>(other)][coefficient], ++n;
@@ -60,7 +60,7 @@ int BasisOf(const JsonValue& header) {
   return static_cast<int>(basis);
 }
 
-ColorCode CodeOfRows(const ColorRows& rows, const std::vector<EarlierVoxels>& earlier,
+ColorCode CodeOfRows(const ColorRows& rows, const std::vector<EarlierRecords>& earlier,
                      double step, const std::vector<float>& weight) {
   const int channels = 3 * rows.basis;
   std::vector<float> values, differences, weights;
@@ -74,7 +74,7 @@ ColorCode CodeOfRows(const ColorRows& rows, const std::vector<EarlierVoxels>& ea
 }
 
 std::vector<int16_t> ColorNumbers(std::string_view bytes, const ColorCode& code, int basis,
-                                  const std::vector<EarlierVoxels>& earlier) {
+                                  const std::vector<EarlierRecords>& earlier) {
   const size_t n = earlier.size();
   std::vector<int16_t> numbers = UnpackNumbers(bytes, 3 * basis, earlier);
   for (int c = 0; c < 3 * basis; ++c) {

@@ -32,13 +32,13 @@ void ReadBox(const JsonValue& header, GridFrame* frame);
 int BasisOf(const JsonValue& header);
 
 // The code of colours whose rows are predicted from `earlier` ones; see FitColorCode.
-ColorCode CodeOfRows(const ColorRows& rows, const std::vector<EarlierVoxels>& earlier,
+ColorCode CodeOfRows(const ColorRows& rows, const std::vector<EarlierRecords>& earlier,
                      double step, const std::vector<float>& weight);
 
 // Numbers [3 basis, n] of a section of colours. Throws Error(kInput) for numbers with more bits
 // than their code has.
 std::vector<int16_t> ColorNumbers(std::string_view bytes, const ColorCode& code, int basis,
-                                  const std::vector<EarlierVoxels>& earlier);
+                                  const std::vector<EarlierRecords>& earlier);
 
 // Throws Error(kInput) unless all coefficients are finite.
 void CheckColors(const Buffer<float>& sh);

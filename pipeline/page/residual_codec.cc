@@ -19,7 +19,7 @@ int16_t Byte(float part) {
 }  // namespace
 
 PageResidual EncodeResidual(const StyleLayers& layers,
-                            const std::vector<EarlierVoxels>& earlier) {
+                            const std::vector<EarlierRecords>& earlier) {
   const size_t n = earlier.size();
   PageResidual page;
   page.rounded = layers;

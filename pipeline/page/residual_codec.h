@@ -36,7 +36,7 @@ struct PageResidual {
 
 // `layers` in the order of `voxels`, whose earlier ones are `earlier`.
 PageResidual EncodeResidual(const StyleLayers& layers,
-                            const std::vector<EarlierVoxels>& earlier);
+                            const std::vector<EarlierRecords>& earlier);
 
 // Adds them to the styled coefficients; layer i is that of voxels[i]. Coefficients and
 // background colours are the source's where the weights are 0; see EQ(style-mix).

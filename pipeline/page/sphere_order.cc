@@ -51,7 +51,7 @@ SphereOrder OrderOfSpheres(std::string_view mask, int resolution, int layers) {
     const int32_t north = at % resolution > 0 ? column[static_cast<size_t>(at - 1)] : -1;
     const int32_t west = at >= resolution ? column[static_cast<size_t>(at - resolution)] : -1;
     for (int i = 0; i < layers; ++i) {
-      EarlierVoxels earlier{-1, -1, -1};
+      EarlierRecords earlier{-1, -1, -1};
       int n = 0;
       if (i > 0) earlier[n++] = own * layers + i - 1;
       if (north >= 0) earlier[n++] = north * layers + i;

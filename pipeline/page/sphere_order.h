@@ -13,8 +13,8 @@
 namespace regrade {
 
 struct SphereOrder {
-  std::vector<int32_t> place;          // [columns]: x R + y in the map
-  std::vector<EarlierVoxels> earlier;  // [columns * layers]: texels inwards, north and west
+  std::vector<int32_t> place;           // [columns]: x R + y in the map
+  std::vector<EarlierRecords> earlier;  // [columns * layers]: texels inwards, north and west
 };
 
 // Columns that a ray can see: with a positive density, or beside such a column.

@@ -30,7 +30,7 @@ struct Part {
   int64_t begin, end;
 
   size_t count() const { return static_cast<size_t>(end - begin); }
-  std::vector<EarlierVoxels> Earlier() const { return EarlierSplats(end - begin, 0); }
+  std::vector<EarlierRecords> Earlier() const { return EarlierSplats(end - begin, 0); }
 };
 
 std::array<Part, 2> PartsOf(int64_t count, int64_t coarse) {
@@ -43,7 +43,7 @@ std::vector<T> Of(const Part& part, const std::vector<T>& all) {
 }
 
 std::string PackShapes(const RadianceField& field, const std::vector<int64_t>& splat,
-                       const std::vector<EarlierVoxels>& earlier) {
+                       const std::vector<EarlierRecords>& earlier) {
   const SplatsView<float> splats = SplatsOf(field);
   std::vector<int16_t> numbers(kSplatNumbers * splat.size());
   for (size_t i = 0; i < splat.size(); ++i) {
@@ -132,7 +132,7 @@ PageField EncodeSplats(const RadianceField& any, double step) {
                                    {"opacity_step", 1.0 / kOpacitySteps}}}};
   for (const Part& part : PartsOf(count, order.coarse)) {
     const std::vector<int64_t> splat = Of(part, order.splat);
-    const std::vector<EarlierVoxels> earlier = part.Earlier();
+    const std::vector<EarlierRecords> earlier = part.Earlier();
     AddSection(part.prefix + "shape", PackShapes(field, splat, earlier), &page);
     AddSection(part.prefix + "color",
                PackNumbers(NumbersOf({sh, basis, splat}, code), 3 * basis, earlier), &page);
@@ -178,7 +178,7 @@ RadianceField DecodeSplats(const PageField& page) {
   return field;
 }
 
-PageVoxels SplatsInPageOrder(const PageField& page, const Geometry& geometry) {
+PageRecords SplatsInPageOrder(const PageField& page, const Geometry& geometry) {
   SplatOrder order = OrderOfSplats(geometry);
   REGRADE_CHECK_EQ(std::ssize(order.splat), page.header.At("voxels").AsInt());
   return {std::move(order.splat), std::move(order.earlier)};

@@ -19,7 +19,7 @@ namespace regrade {
 // See EncodeField, DecodeField, RecordsInPageOrder and ColorWeights.
 PageField EncodeSplats(const RadianceField& field, double step);
 RadianceField DecodeSplats(const PageField& page);
-PageVoxels SplatsInPageOrder(const PageField& page, const Geometry& geometry);
+PageRecords SplatsInPageOrder(const PageField& page, const Geometry& geometry);
 // Opacity times the area of the two longest axes.
 std::vector<float> LightOfSplats(const Geometry& geometry);
 

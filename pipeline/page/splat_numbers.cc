@@ -93,8 +93,8 @@ Splat<float> SplatOfNumbers(const SplatNumbers& numbers, const GridFrame& box) {
   return splat;
 }
 
-std::vector<EarlierVoxels> EarlierSplats(int64_t count, int64_t coarse) {
-  std::vector<EarlierVoxels> earlier(static_cast<size_t>(count), {-1, -1, -1});
+std::vector<EarlierRecords> EarlierSplats(int64_t count, int64_t coarse) {
+  std::vector<EarlierRecords> earlier(static_cast<size_t>(count), {-1, -1, -1});
   for (int64_t i = 0; i < count; ++i) {
     const int64_t first = i < coarse ? 0 : coarse;
     for (int64_t k = 0; k < 3 && i - k > first; ++k)

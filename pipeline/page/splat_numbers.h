@@ -40,8 +40,8 @@ Splat<float> SplatOfNumbers(const SplatNumbers& numbers, const GridFrame& box);
 // times the area of the two longest axes over the squared distance from the box, as a scene
 // that stands for the whole one.
 struct SplatOrder {
-  std::vector<int64_t> splat;          // [N]: which it is in the geometry
-  std::vector<EarlierVoxels> earlier;  // [N]
+  std::vector<int64_t> splat;           // [N]: which it is in the geometry
+  std::vector<EarlierRecords> earlier;  // [N]
   int64_t coarse = 0;
 };
 
@@ -49,6 +49,6 @@ struct SplatOrder {
 SplatOrder OrderOfSplats(const Geometry& geometry);
 
 // What OrderOfSplats has, of N splats.
-std::vector<EarlierVoxels> EarlierSplats(int64_t count, int64_t coarse);
+std::vector<EarlierRecords> EarlierSplats(int64_t count, int64_t coarse);
 
 }  // namespace regrade

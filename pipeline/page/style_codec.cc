@@ -96,7 +96,7 @@ PageStyle EncodeStyle(const StoredNetwork& stored, const RadianceField& page, do
 }
 
 PageStyle EncodeStyle(const StoredNetwork& stored, const RadianceField& page, double strength,
-                      const StyleLayers& layers, const PageVoxels& places) {
+                      const StyleLayers& layers, const PageRecords& places) {
   const LipschitzNetworkData& data = stored.network.data();
   DenseNetwork<float> dense = OfPagesHarmonics(stored.network);
   std::string halves;

@@ -28,7 +28,7 @@ struct PageStyle {
 PageStyle EncodeStyle(const StoredNetwork& stored, const RadianceField& page, double strength);
 // With what the style adds voxel by voxel; `places`: the page's voxels in `page`.
 PageStyle EncodeStyle(const StoredNetwork& stored, const RadianceField& page, double strength,
-                      const StyleLayers& layers, const PageVoxels& places);
+                      const StyleLayers& layers, const PageRecords& places);
 
 // The styled coefficients as a page that has run the network holds them: four words of 32 bits,
 // the lowest byte first, for each of `voxels`, see RecordsInPageOrder.

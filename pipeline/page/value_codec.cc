@@ -9,7 +9,7 @@ namespace regrade {
 namespace {
 
 // `number` is one channel; the voxels before `earlier` are known.
-int Prediction(const int16_t* number, const EarlierVoxels& earlier) {
+int Prediction(const int16_t* number, const EarlierRecords& earlier) {
   int sum = 0, n = 0;
   for (const int32_t other : earlier)
     if (other >= 0) sum += number[other], ++n;
@@ -25,7 +25,7 @@ int16_t Rounded(double value) {
 }  // namespace
 
 std::string PackNumbers(const std::vector<int16_t>& number, int channels,
-                        const std::vector<EarlierVoxels>& earlier) {
+                        const std::vector<EarlierRecords>& earlier) {
   const size_t n = earlier.size();
   std::string bytes(2 * n * static_cast<size_t>(channels), '\0');
 #pragma omp parallel for schedule(dynamic)
@@ -44,7 +44,7 @@ std::string PackNumbers(const std::vector<int16_t>& number, int channels,
 }
 
 std::vector<int16_t> UnpackNumbers(std::string_view bytes, int channels,
-                                   const std::vector<EarlierVoxels>& earlier) {
+                                   const std::vector<EarlierRecords>& earlier) {
   const size_t n = earlier.size();
   if (bytes.size() != 2 * n * static_cast<size_t>(channels))
     throw InputError(
@@ -113,7 +113,7 @@ std::vector<float> ValuesOf(const std::vector<int16_t>& numbers,
 }
 
 std::vector<float> Differences(const std::vector<float>& values, int channels,
-                               const std::vector<EarlierVoxels>& earlier) {
+                               const std::vector<EarlierRecords>& earlier) {
   std::vector<float> difference(values.size());
   for (size_t i = 0; i < earlier.size(); ++i)
     for (int c = 0; c < channels; ++c) {

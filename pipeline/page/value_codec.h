@@ -21,10 +21,10 @@ inline constexpr int kMaxNumber = 16383;  // differences of such numbers fit in 
 
 // `number` [channels, V], within +-kMaxNumber; the result has 2 channels V bytes.
 std::string PackNumbers(const std::vector<int16_t>& number, int channels,
-                        const std::vector<EarlierVoxels>& earlier);
+                        const std::vector<EarlierRecords>& earlier);
 // Throws Error(kInput) for bytes of another size and numbers out of range.
 std::vector<int16_t> UnpackNumbers(std::string_view bytes, int channels,
-                                   const std::vector<EarlierVoxels>& earlier);
+                                   const std::vector<EarlierRecords>& earlier);
 
 // EQ(page-density): q = sign(sigma) round(sqrt(|sigma| w / tau)), w the width of a voxel and
 // tau = kPageOpticalDepth. Photon noise grows as the square root; so does the error that a
@@ -42,7 +42,7 @@ std::vector<float> ValuesOf(const std::vector<int16_t>& numbers,
 
 // values [V, channels] minus the mean of the earlier neighbours' values.
 std::vector<float> Differences(const std::vector<float>& values, int channels,
-                               const std::vector<EarlierVoxels>& earlier);
+                               const std::vector<EarlierRecords>& earlier);
 
 // What a graphics processor holds of a value: code [0, 255] of 8 bits, (code - 128) * scale.
 // The scale of a channel, from the largest magnitude among the values [V, channels].

@@ -30,7 +30,7 @@ double VoxelWidth(const GridFrame& frame) {
   return 1 / double{std::min({scale.x, scale.y, scale.z})};
 }
 
-void EncodeVoxelColors(const ColorRows& rows, const std::vector<EarlierVoxels>& earlier,
+void EncodeVoxelColors(const ColorRows& rows, const std::vector<EarlierRecords>& earlier,
                        double step, PageField* page) {
   const ColorCode code = CodeOfRows(rows, earlier, step, {});
   const std::string bytes = PackNumbers(NumbersOf(rows, code), 3 * rows.basis, earlier);
@@ -40,7 +40,7 @@ void EncodeVoxelColors(const ColorRows& rows, const std::vector<EarlierVoxels>& 
 
 // Sets the coefficients [V, 3, basis] of the voxels `voxel`.
 void DecodeVoxelColors(const PageField& page, int basis, const std::vector<int64_t>& voxel,
-                       const std::vector<EarlierVoxels>& earlier, Buffer<float>* sh) {
+                       const std::vector<EarlierRecords>& earlier, Buffer<float>* sh) {
   const ColorCode code = ColorCodeOf(page.header.At("color"));
   const std::string bytes =
       SectionBytes(page, "color", 6 * static_cast<size_t>(basis) * earlier.size());
@@ -50,7 +50,7 @@ void DecodeVoxelColors(const PageField& page, int basis, const std::vector<int64
 
 // The colours of background spheres.
 void EncodeColors(const std::vector<float>& values, int channels,
-                  const std::vector<EarlierVoxels>& earlier, double step, const char* name,
+                  const std::vector<EarlierRecords>& earlier, double step, const char* name,
                   PageField* page) {
   const ValueTransform transform =
       DecorrelatingTransform(Differences(values, channels, earlier), channels);
@@ -64,7 +64,7 @@ void EncodeColors(const std::vector<float>& values, int channels,
 
 // [V, channels], of 8 bits.
 std::vector<float> DecodeColors(const PageField& page, int channels,
-                                const std::vector<EarlierVoxels>& earlier, const char* name) {
+                                const std::vector<EarlierRecords>& earlier, const char* name) {
   const JsonValue& header = page.header.At(name);
   const size_t n = static_cast<size_t>(channels);
   const ValueTransform transform{channels, NumbersAt(header, "matrix", n * n)};
@@ -156,7 +156,7 @@ void MakeLinks(const PageOrder& order, Geometry* geometry) {
 
 }  // namespace
 
-PageVoxels VoxelsInPageOrder(const PageField& page, const Geometry& geometry) {
+PageRecords VoxelsInPageOrder(const PageField& page, const Geometry& geometry) {
   PageOrder order =
       OrderOfMask(SectionBytes(page, "mask", kMaxPlaces), geometry.frame.resolution);
   std::vector<int64_t> voxel = VoxelsOf(geometry, order);

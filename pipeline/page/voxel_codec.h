@@ -19,7 +19,7 @@ namespace regrade {
 // See EncodeField, DecodeField, RecordsInPageOrder and ColorWeights.
 PageField EncodeVoxels(const RadianceField& field, double step);
 RadianceField DecodeVoxels(const PageField& page);
-PageVoxels VoxelsInPageOrder(const PageField& page, const Geometry& geometry);
+PageRecords VoxelsInPageOrder(const PageField& page, const Geometry& geometry);
 std::vector<float> OpacityOfVoxels(const Geometry& geometry);
 
 }  // namespace regrade

@@ -13,6 +13,19 @@
 namespace regrade {
 namespace {
 
+// 1.4 M of 3.4 M vertices, of a box fitted to its scene, at 192 voxels on the longest side.
+constexpr double kStoredFraction = 0.4;
+// With two threads, at a grid of kRateResolution a side; a ray's cost grows with the
+// resolution.
+constexpr double kRaysPerSecond = 105e3;  // 80 to 138 on three captures
+constexpr double kRateResolution = 160;
+constexpr double kDeviceSamplesPerSecond =
+    1e8;  // of an H200, with all that a step does: 54 to 119 with the paper's schedules
+// With two threads, of a step of kStyleRateRays; of more rays, see PlanStyle.
+constexpr double kStyleSecondsPerStep = 0.075;
+constexpr double kStyleRateRays = 4096;
+constexpr double kStyleRateGrowth = 0.8;  // whole views of 270x480 take 353 s, not 20
+
 constexpr double kGridBytes = 4 + 8;     // per vertex: link, and density with link again
 constexpr double kPixelBytes = 12 + 6;   // floats as read, 16 bits a channel as drawn
 constexpr double kSphereFraction = 0.6;  // of a map's texels are visible in photos

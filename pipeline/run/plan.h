@@ -22,20 +22,8 @@
 
 namespace regrade {
 
-// 1.4 M of 3.4 M vertices, of a box fitted to its scene, at 192 voxels on the longest side.
-inline constexpr double kStoredFraction = 0.4;
 inline constexpr double kProgramBytes = 150e6;
-// With two threads, at a grid of kRateResolution a side; a ray's cost grows with the
-// resolution.
-inline constexpr double kRaysPerSecond = 105e3;  // 80 to 138 on three captures
-inline constexpr double kRateResolution = 160;
-inline constexpr double kDeviceSamplesPerSecond =
-    1e8;  // of an H200, with all that a step does: 54 to 119 with the paper's schedules
-// With two threads, of a step of kStyleRateRays; of more rays, see PlanStyle.
-inline constexpr double kStyleSecondsPerStep = 0.075;
-inline constexpr double kStyleRateRays = 4096;
-inline constexpr double kStyleRateGrowth = 0.8;    // whole views of 270x480 take 353 s, not 20
-inline constexpr double kPoseSecondsPerPhoto = 2;  // COLMAP, with two threads
+inline constexpr double kPoseSecondsPerPhoto = 2;     // COLMAP, with two threads
 inline constexpr double kTrackSecondsPerPhoto = 0.6;  // likewise, with known poses
 
 struct StagePlan {

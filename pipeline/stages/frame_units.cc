@@ -5,6 +5,7 @@
 #include "kernels/base/error.h"
 #include "pipeline/images/video_writer.h"
 #include "pipeline/run/film_parts.h"
+#include "pipeline/run/plan.h"
 #include "pipeline/workspace/output_names.h"
 
 namespace regrade {
@@ -53,9 +54,9 @@ std::vector<FrameUnit> UnitsOfPart(const std::vector<FrameUnit>& units,
 
 std::vector<std::vector<FrameUnit>> BatchesWithin(const std::vector<FrameUnit>& units,
                                                   int64_t splats, uint64_t memory) {
-  constexpr uint64_t kProgramBytes = 150'000'000, kSplatBytes = 400;
+  constexpr double kSplatBytes = 400;
   if (splats == 0 || memory == 0 ||
-      kProgramBytes + kSplatBytes * static_cast<uint64_t>(splats) <= memory)
+      kProgramBytes + kSplatBytes * static_cast<double>(splats) <= static_cast<double>(memory))
     return {units};
   std::vector<std::vector<FrameUnit>> each;
   for (const FrameUnit& unit : units) each.push_back({unit});

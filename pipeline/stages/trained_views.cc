@@ -14,7 +14,6 @@
 namespace regrade {
 namespace {
 
-constexpr uint64_t kTrainingBytes = 150'000'000;
 constexpr uint64_t kGeometryBytes = 60;  // a splat of the file, while it is read
 constexpr uint64_t kTrainedBytes = 450;  // a splat that is trained on
 constexpr uint64_t kPictureBytes = 12;   // a pixel of a photo and its target
@@ -34,14 +33,15 @@ std::vector<int> Spread(int count) {
 bool IsTrainedOnAPart(const RunSettings& settings, int64_t splats) {
   if (settings.run.max_memory_gb <= 0 || settings.object.On() || settings.residual.On())
     return false;
-  return kTrainingBytes + kTrainedBytes * static_cast<uint64_t>(splats) >
+  return static_cast<uint64_t>(kProgramBytes) + kTrainedBytes * static_cast<uint64_t>(splats) >
          PlannedMemory(settings.run.max_memory_gb, 0);
 }
 
 std::vector<int> CamerasWithin(uint64_t memory, const RadianceField& splats,
                                const std::vector<Camera>& cameras) {
   const SplatsView<float> view = SplatsWithoutColors(splats.geometry->splats);
-  const uint64_t all = kTrainingBytes + kGeometryBytes * static_cast<uint64_t>(view.count);
+  const uint64_t all =
+      static_cast<uint64_t>(kProgramBytes) + kGeometryBytes * static_cast<uint64_t>(view.count);
   std::vector<uint8_t> seen(static_cast<size_t>(view.count));
   uint64_t bytes = all;
   std::vector<int> within;

@@ -106,7 +106,7 @@ TEST(PageCodec, DamagedSectionsAreRefused) {
 
 // EQ(page-prediction): numbers come back to the bit, negative ones and the largest, too.
 TEST(PageCodec, NumbersComeBack) {
-  std::vector<EarlierVoxels> earlier;
+  std::vector<EarlierRecords> earlier;
   std::vector<int16_t> number;
   for (int32_t i = 0; i < 200; ++i) {
     earlier.push_back({i > 0 ? i - 1 : -1, i > 4 ? i - 5 : -1, i > 30 ? i - 31 : -1});

@@ -31,7 +31,7 @@ StyleLayers SomeLayers(size_t voxels) {
 TEST(ResidualCodec, RoundedByHalfAStepAndZeroStaysZero) {
   const RadianceField field = testing::RandomField({16, 24, 16}, 9, 0.5, 5);
   const PageField page = EncodeField(field, 0.03);
-  const PageVoxels places = RecordsInPageOrder(page, *field.geometry);
+  const PageRecords places = RecordsInPageOrder(page, *field.geometry);
   const size_t n = places.voxel.size();
   const StyleLayers layers = SomeLayers(n);
   const PageResidual packed = EncodeResidual(layers, places.earlier);
@@ -59,7 +59,7 @@ TEST(ResidualCodec, RoundedByHalfAStepAndZeroStaysZero) {
 TEST(ResidualCodec, NothingAddedCostsAlmostNothing) {
   const RadianceField field = testing::RandomField({32, 32, 32}, 1, 0.5, 5);
   const PageField page = EncodeField(field, 0.03);
-  const PageVoxels places = RecordsInPageOrder(page, *field.geometry);
+  const PageRecords places = RecordsInPageOrder(page, *field.geometry);
   const size_t n = places.voxel.size();
   StyleLayers layers;
   layers.residual.color.resize(n);
@@ -106,8 +106,8 @@ TEST(ResidualCodec, VoxelsOfRoundedDensitiesKeepTheirNumbers) {
   field.geometry = geometry;
   const PageField page = EncodeField(field, 0.03);
   const RadianceField decoded = DecodeField(page);
-  const PageVoxels before = RecordsInPageOrder(page, *field.geometry);
-  const PageVoxels after = RecordsInPageOrder(page, *decoded.geometry);
+  const PageRecords before = RecordsInPageOrder(page, *field.geometry);
+  const PageRecords after = RecordsInPageOrder(page, *decoded.geometry);
   ASSERT_EQ(std::ssize(after.voxel), page.header.At("voxels").AsInt());
   ASSERT_EQ(before.voxel.size(), after.voxel.size());
   for (size_t i = 0; i < after.voxel.size(); ++i)

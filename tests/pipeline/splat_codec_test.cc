@@ -141,8 +141,8 @@ TEST(SplatCodec, OrderIsThatOfTheDecodedField) {
   const RadianceField field = FieldOf(500, 4);
   const PageField page = EncodeField(field, kSplatPageStep);
   const RadianceField decoded = DecodeField(page);
-  const PageVoxels of = RecordsInPageOrder(page, *field.geometry),
-                   own = RecordsInPageOrder(page, *decoded.geometry);
+  const PageRecords of = RecordsInPageOrder(page, *field.geometry),
+                    own = RecordsInPageOrder(page, *decoded.geometry);
   EXPECT_EQ(of.earlier, own.earlier);
   std::vector<int64_t> all(own.voxel.size());
   std::iota(all.begin(), all.end(), 0);

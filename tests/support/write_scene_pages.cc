@@ -133,7 +133,7 @@ void WritePages(const std::string& folder, const std::string& name, const Radian
           field.geometry->splats.on() ? std::nullopt : CoarseField(field, {.most_part = 10}))
     content.coarse = EncodeField(*coarse, 0.03);
   RadianceField page = DecodeField(content.field);
-  const PageVoxels places = RecordsInPageOrder(content.field, *page.geometry);
+  const PageRecords places = RecordsInPageOrder(content.field, *page.geometry);
   StyleLayers layers;
   if (kind != Layers::kNone) layers = SomeLayers(kind, places.voxel.size());
   content.styles = {EncodeStyle(Style(), page, 0.5, layers, places)};

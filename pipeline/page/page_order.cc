@@ -1,8 +1,9 @@
 // The order of a grid's voxels: brick by brick.
+#include "pipeline/page/page_order.h"
+
 #include <algorithm>
 
 #include "kernels/base/error.h"
-#include "pipeline/page/page_order.h"
 
 namespace regrade {
 namespace {
@@ -105,7 +106,7 @@ PageOrder OrderOfMask(std::string_view mask, const Vec3i& voxels) {
       if (!bit(next, i)) return;
       const auto own = static_cast<int32_t>(order.place.size());
       if (own >= kMaxPageVoxels) throw InputError("there are too many voxels for a page");
-      EarlierVoxels earlier{-1, -1, -1};
+      EarlierRecords earlier{-1, -1, -1};
       int n = 0;
       for (int a = 0; a < 3; ++a) {
         Vec3i before = at;
