@@ -31,8 +31,8 @@ std::vector<int> Spread(int count) {
 }  // namespace
 
 bool IsTrainedOnAPart(const RunSettings& settings, int64_t splats) {
-  if (settings.run.max_memory_gb <= 0 || settings.object.On() || settings.residual.On())
-    return false;
+  if (splats == 0 || settings.run.max_memory_gb <= 0) return false;
+  if (settings.object.On() || settings.residual.On()) return false;
   return static_cast<uint64_t>(kProgramBytes) + kTrainedBytes * static_cast<uint64_t>(splats) >
          PlannedMemory(settings.run.max_memory_gb, 0);
 }

@@ -23,9 +23,9 @@ struct TrainedField {
   std::string notice;  // of what was left out; else empty
 };
 
-// Whether a style of a field with so many splats is trained on a part of it: where the whole
-// does not fit into --max-memory. What is free decides nothing: the same command makes the same
-// style. A style of an object, or with a residual, knows all splats.
+// Whether a style of a field with so many splats (0: of voxels) is trained on a part of it:
+// where the whole does not fit into --max-memory. What is free decides nothing: the same
+// command makes the same style. A style of an object, or with a residual, knows all splats.
 bool IsTrainedOnAPart(const RunSettings& settings, int64_t splats);
 
 // `geometry`: of ReadFieldGeometry. `views`: in the field's frame; `indices`: those with a

@@ -75,6 +75,18 @@ TEST(TrainedViews, AreAsManyAsFitEvenlyAmongAll) {
   EXPECT_EQ(CamerasWithin(0, ball, cameras), std::vector<int>{0});
 }
 
+TEST(TrainedViews, AreAllWithoutALimitAndOfVoxelsAndObjects) {
+  RunSettings settings;
+  EXPECT_FALSE(IsTrainedOnAPart(settings, 100'000'000));
+  settings.run.max_memory_gb = 1;
+  EXPECT_TRUE(IsTrainedOnAPart(settings, 2'000'000));
+  EXPECT_FALSE(IsTrainedOnAPart(settings, 1'000'000));
+  settings.run.max_memory_gb = 0.01;
+  EXPECT_FALSE(IsTrainedOnAPart(settings, 0));
+  settings.object.masks = "masks";
+  EXPECT_FALSE(IsTrainedOnAPart(settings, 2'000'000));
+}
+
 TEST(Page, OfAFieldThatIsTooLargeHasWhatPhotosShowMost) {
   const TemporaryFolder folder;
   testing::WriteCapture(folder / "s", 6, "96x72");
