@@ -233,9 +233,9 @@ def check_folder(browser, arguments):
             here += complaints(page)
             found += [f"{name}, {size_name}: {complaint}" for complaint in here]
             page.close()
-        if name in ("grid", "near_object", "splats"):
+        if name in ("near_object", "splats"):
             found += [f"{name}, opening: {c}" for c in check_coarse_first(browser, path) + check_without_workers(browser, path, views, splats)]
-        if name in ("grid", "grid_residual", "splats"):
+        if name in ("grid_residual", "splats"):
             found += [f"{name}, {c}" for c in check_graphics(browser, path, views)]
     return found
 

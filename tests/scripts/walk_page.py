@@ -26,7 +26,7 @@ RING_CONTRAST = 3  # WCAG 2.2, 1.4.11
 
 # Everything that can be operated, with what says that it was.
 SETUP = """(async () => {
-  const p = regradePage, style = {...p.header.styles[0], weights: network_0.textContent};
+  const p = regradePage, style = {...p.header.styles[0], residual: null, weights: network_0.textContent};
   await p.putStyle(1, {...style, name: 'noon'});
   await p.putStyle(2, {...style, name: 'night'});
   const c = document.createElement('canvas'), x = c.getContext('2d');
@@ -219,7 +219,7 @@ def check_work(page):
     at("#save_film", "Enter", "!cancel.hidden", "film_size.value = 64; regradePage.path.keyframes[1].time = 60; 0")
     at("#cancel", " ", "cancel.hidden")
     at("#film_fps", "Escape", "path.hidden && document.activeElement === show_path")
-    at("#show_facts", " ", "!facts.hidden && show_facts.ariaExpanded === 'true' && facts.textContent.includes('Voxels')")
+    at("#show_facts", " ", "!facts.hidden && show_facts.ariaExpanded === 'true' && facts.textContent.includes('Splats')")
     at("#show_facts", " ", "facts.hidden && show_facts.ariaExpanded === 'false'")
     at("#show_help", "Enter", "!help.hidden && show_help.ariaExpanded === 'true' && document.activeElement === help")
     found.extend(check_contrast(page))
@@ -310,7 +310,7 @@ def check_axe(page, file):
 
 def main():
     parser = parser_of(__doc__)
-    parser.add_argument("page", help="a scene page with a style")
+    parser.add_argument("page", help="a page of splats with a style")
     parser.add_argument("--axe", help="axe-core's axe.min.js")
     arguments = parsed(parser)
     found = []
