@@ -13,6 +13,7 @@ namespace regrade {
 
 struct RenderKind {
   std::unique_ptr<KindRenderer> (*make_renderer)(const RadianceField& field, Backend backend);
+  // The same of a field that is not needed any more, without a copy.
   std::unique_ptr<KindRenderer> (*take_field)(RadianceField&& field, Backend backend);
   // See MakeRayWeigher, RayDepths and OpticalDepths.
   std::unique_ptr<RayWeigher> (*make_weigher)(const Geometry& geometry, float near_clip,

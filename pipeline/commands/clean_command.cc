@@ -45,8 +45,7 @@ std::vector<Removable> RemovableIn(const std::string& folder) {
     all.push_back({style + "/" + kPartsFolder, "`regrade render --part` makes them again"});
     all.push_back(
         {style + "/field_2d.npz", "made again by `regrade evaluate --control-field`"});
-    all.push_back({style + "/styled.npz",
-                   "of an earlier version; `regrade export --format svox2` writes it"});
+    all.push_back({style + "/styled.npz", "of an earlier version; `regrade export` writes it"});
     all.push_back({style + "/.regrade/checkpoints",
                    "a stage that was interrupted would begin from its start"});
   }

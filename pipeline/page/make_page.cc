@@ -7,7 +7,6 @@
 #include <utility>
 
 #include "kernels/base/error.h"
-#include "kernels/field/pad_sh_basis.h"
 #include "kernels/image/color_statistics.h"
 #include "kernels/image/resize.h"
 #include "kernels/render/field_renderer.h"
@@ -70,10 +69,7 @@ RadianceField ExactStyle(const RadianceField& source, const StoredNetwork& netwo
   RadianceField exact{source.geometry, ApplyNetwork(network.network, source),
                       network.background, source.near_clip, source.march};
   if (!layers.residual.color.empty()) AddResidual(layers.residual, &exact.appearance);
-  if (layers.weight.empty()) return exact;
-  RadianceField padded = source;
-  padded.appearance = PadShBasis(std::move(padded.appearance), exact.appearance.basis);
-  return MixFields(padded, {&exact}, {1}, &layers.weight);
+  return layers.weight.empty() ? exact : MixFields(source, {&exact}, {1}, &layers.weight);
 }
 
 Image RenderHome(const RadianceField& field, const Camera& home) {

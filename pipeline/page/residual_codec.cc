@@ -60,18 +60,19 @@ PageResidual EncodeResidual(const StyleLayers& layers,
 void ApplyLayers(const StyleLayers& layers, const std::vector<int64_t>& voxels,
                  const RadianceField& source, RadianceField* styled) {
   const int stride = styled->appearance.stride(), basis = styled->appearance.basis;
-  REGRADE_CHECK_EQ(source.appearance.stride(), stride);
+  const int own = source.appearance.basis;  // what it lacks counts as 0
   for (size_t i = 0; i < voxels.size(); ++i) {
     float* const sh = styled->appearance.sh.data() + voxels[i] * stride;
-    const float* const before = source.appearance.sh.data() + voxels[i] * stride;
+    const float* const before = source.appearance.sh.data() + voxels[i] * 3 * own;
     for (int j = 0; j < stride; ++j) {
-      const int c = j / basis;
-      if (!layers.residual.color.empty() && j % basis == 0)
+      const int c = j / basis, k = j % basis;
+      if (!layers.residual.color.empty() && k == 0)
         sh[j] += layers.residual.color[i][c] / static_cast<float>(kSh0);
-      if (!layers.residual.view_scale.empty() && j % basis != 0)
+      if (!layers.residual.view_scale.empty() && k != 0)
         sh[j] *= layers.residual.view_scale[i][c];
       if (!layers.weight.empty())
-        sh[j] = (1 - layers.weight[i]) * before[j] + layers.weight[i] * sh[j];
+        sh[j] = (1 - layers.weight[i]) * (k < own ? before[c * own + k] : 0.0f) +
+                layers.weight[i] * sh[j];
     }
   }
   if (layers.weight.empty()) return;

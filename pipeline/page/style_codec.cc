@@ -7,7 +7,6 @@
 #include <vector>
 
 #include "kernels/base/half.h"
-#include "kernels/field/pad_sh_basis.h"
 #include "kernels/network/fused_mlp.h"
 #include "pipeline/files/deflate.h"
 #include "pipeline/page/color_code.h"
@@ -107,12 +106,6 @@ PageStyle EncodeStyle(const StoredNetwork& stored, const RadianceField& page, do
   const FusedMlp fused = MakeFusedMlp(dense);
   PageStyle style;
   style.styled = {page.geometry, {}, stored.background, page.near_clip, page.march};
-  RadianceField padded;  // of a page with fewer harmonics
-  if (page.appearance.basis != kStyledBasis) {
-    padded = page;
-    padded.appearance = PadShBasis(std::move(padded.appearance), kStyledBasis);
-  }
-  const RadianceField& source = padded.geometry ? padded : page;
   style.styled.appearance = ApplyForward(
       [&](const float* features, int64_t n, float* output) {
         FusedForward(fused, features, n, output);
@@ -121,11 +114,11 @@ PageStyle EncodeStyle(const StoredNetwork& stored, const RadianceField& page, do
           AddBaseMap(data.base, kStyledBasis, features + r * fused.ends,
                      output + r * fused.ends);
       },
-      data.position_scale, source);
+      data.position_scale, page);
   JsonValue residual;
   if (!layers.empty()) {
     PageResidual packed = EncodeResidual(layers, places.earlier);
-    ApplyLayers(packed.rounded, places.voxel, source, &style.styled);
+    ApplyLayers(packed.rounded, places.voxel, page, &style.styled);
     style.residual = std::move(packed.packed);
     residual = std::move(packed.header);
   }

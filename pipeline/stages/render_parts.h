@@ -13,8 +13,8 @@
 
 namespace regrade {
 
-// Calls `render` for each unit, once `frames` shows the field or, where it does not fit into
-// memory, from the parts of it that they see. `geometry`: of ReadFieldGeometry.
+// Calls `render` for each unit, once `frames` shows the field or, where that does not fit into
+// memory, the part of it that the unit sees. `geometry`: of ReadFieldGeometry.
 void RenderUnits(const std::vector<FrameUnit>& units, StoredField geometry,
                  const RunContext& context, SceneFrames* frames,
                  const std::function<void(const FrameUnit&)>& render);

@@ -5,13 +5,11 @@
 #include <utility>
 
 #include "kernels/base/error.h"
-#include "kernels/field/pad_sh_basis.h"
 #include "pipeline/fields/residual_file.h"
 #include "pipeline/run/run_file.h"
 #include "pipeline/stages/object_edit.h"
 #include "stylize/field/apply_network.h"
 #include "stylize/field/blend_fields.h"
-#include "stylize/training/restyle_field.h"
 
 namespace regrade {
 
@@ -25,11 +23,8 @@ StoredField StyledFieldOf(const StoredField& source, const StoredNetwork& networ
                      source.ndc,
                      source.records};
   if (residual != nullptr) AddResidual(*residual, &styled.field.appearance);
-  if (strength != 1 || object_weights != nullptr) {
-    RadianceField padded = field;
-    padded.appearance = PadShBasis(std::move(padded.appearance), styled.field.appearance.basis);
-    styled.field = MixFields(padded, {&styled.field}, {strength}, object_weights);
-  }
+  if (strength != 1 || object_weights != nullptr)
+    styled.field = MixFields(field, {&styled.field}, {strength}, object_weights);
   RoundAsStored(&styled.field.appearance);
   return styled;
 }

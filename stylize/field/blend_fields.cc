@@ -4,8 +4,10 @@
 #include <cmath>
 #include <cstring>
 #include <string>
+#include <utility>
 
 #include "kernels/base/error.h"
+#include "kernels/field/pad_sh_basis.h"
 
 namespace regrade {
 namespace {
@@ -74,6 +76,11 @@ RadianceField MixFields(const RadianceField& source,
                         const std::vector<float>* object_weights) {
   REGRADE_CHECK_EQ(styles.size(), weights.size());
   const double sum = CheckWeights(weights);
+  if (!styles.empty() && styles[0]->appearance.basis > source.appearance.basis) {
+    RadianceField padded = source;
+    padded.appearance = PadShBasis(std::move(padded.appearance), styles[0]->appearance.basis);
+    return MixFields(padded, styles, weights, object_weights);
+  }
   for (size_t i = 0; i < styles.size(); ++i)
     if (styles[i]->appearance.basis != source.appearance.basis ||
         !SameGeometry(*source.geometry, *styles[i]->geometry))

@@ -17,6 +17,7 @@
 
 namespace regrade {
 
+// A source with fewer harmonics than its styles counts as padded with zeros, see PadShBasis.
 // `object_weights` [voxels] may be null. Where all of a voxel but one part has weight 0, its
 // coefficients are that part's, to the bit; so at the ends the fields themselves come back.
 // Backgrounds, flat and on spheres, are mixed with the same weights, and stay the source's

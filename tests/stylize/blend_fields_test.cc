@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cstring>
 
+#include "kernels/field/pad_sh_basis.h"
 #include "tests/support/expect_error.h"
 #include "tests/support/floating_point_traps.h"
 #include "tests/support/record_error.h"
@@ -111,6 +112,18 @@ TEST(MixFields, H49_WhatIsBeyondTheEndsIsRefused) {
   const RadianceField other = Ball(15);
   EXPECT_REGRADE_ERROR(MixFields(s.source, {&s.day, &other}, {0.5, 0.5}), ExitCode::kInput,
                        "style 2");
+}
+
+TEST(MixFields, ASourceWithFewerHarmonicsCountsAsPadded) {
+  const Styles s;
+  RadianceField fewer = s.source, padded = s.source;
+  fewer.appearance = LimitShBasis(s.source.appearance, 4);
+  padded.appearance = PadShBasis(fewer.appearance, s.day.appearance.basis);
+  const RadianceField is = MixFields(fewer, {&s.day}, {0.3}),
+                      should = MixFields(padded, {&s.day}, {0.3});
+  ASSERT_EQ(is.appearance.basis, s.day.appearance.basis);
+  for (int64_t i = 0; i < should.appearance.sh.size(); ++i)
+    ASSERT_EQ(is.appearance.sh[i], should.appearance.sh[i]);
 }
 
 // Colours on background spheres are mixed as voxels are, and stay where only an object is
