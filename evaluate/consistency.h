@@ -20,13 +20,16 @@ struct ConsistencyOptions {
   std::string warp = "later", error_per = "channel";
   std::string lpips, edges;
   double min_coverage = 0.4;
-  bool controls = false, control_field = false;  // the caller adds the sequences
+  std::string controls = "off";  // the caller adds the sequences
   // Frames come in excerpts of that many, and pairs lie within one; 0: all are one sequence.
   // Not an option of the user: it follows from the frames.
   int excerpt = 0;
   // What --flow files:DIR calls the frames, if not 0, 1, ... (see flow_folder.h). Not an option
   // of the user either.
   std::vector<int64_t> flow_frames = {};
+
+  bool HasControls() const { return controls != "off"; }
+  bool HasControlField() const { return controls == "field"; }
 
   template <typename Bind>
   void Describe(Bind& bind) {
@@ -59,8 +62,7 @@ struct ConsistencyOptions {
          {.help = "what a pair's squared error is divided by: the colour channels of the "
                   "compared pixels, or those pixels, which is 4.77 dB lower; not of mode "
                   "stylegaussian",
-          .choices = "channel|pixel",
-          .constant = true});
+          .choices = "channel|pixel"});
     bind("lpips", lpips,
          {.help = "ONNX file of a perceptual distance network (LPIPS), with the inputs of "
                   "--flow onnx:FILE; compares each sequence with the 2D method's frames",
@@ -82,13 +84,12 @@ struct ConsistencyOptions {
          .max = 1,
          .constant = true});
     bind("controls", controls,
-         {.help = "adds rows that bound the table: one linear colour map, the styled frames "
-                  "blurred and in grey; for runs also the photos and the 2D method on them"});
-    bind("control-field", control_field,
-         {.help =
-              "for runs, adds a row of the naive way to style a scene: a field fitted to the "
-              "2D method's pictures of the photos, with the options of the scene's own fit "
-              "and its time"});
+         {.help = "adds rows that bound the table: on adds one linear colour map, the styled "
+                  "frames blurred and in grey, and for runs also the photos and the 2D method "
+                  "on them; field also adds, for runs, the naive way to style a scene: a field "
+                  "fitted to the 2D method's pictures of the photos, with the options of the "
+                  "scene's own fit and its time",
+          .choices = "off|on|field"});
   }
 };
 

@@ -170,7 +170,7 @@ std::string FormatTable(const std::string& title, const std::vector<TableCells>&
   }
   if (form == "csv") return Commented(title, "# ") + Csv(rows) + Commented(remarks, "# ");
   if (form == "latex") return Latex(title, rows, of.label) + Commented(remarks, "% ");
-  throw UsageError("there is no table form '" + form + "'", "--table",
+  throw UsageError("there is no table form '" + form + "'", "--format",
                    std::string("use one of ") + kTableForms);
 }
 

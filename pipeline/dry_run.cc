@@ -87,7 +87,7 @@ void SayPaperConfig(RunContext* context) {
   const std::string name = asked ? settings.run.paper_config : kPaperBase;
   ApplyPaperChoice({name, ""}, &context->options);
   context->console->Info("configuration of the paper: " + name +
-                         (asked ? ", as --paper-config says"
+                         (asked ? ", as paper-config says"
                                 : ", unless the photos are transparent (syn) or all look one "
                                   "way (llff)"));
   if (!asked) SayOtherConfigs(context);

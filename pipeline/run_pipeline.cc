@@ -172,13 +172,13 @@ std::vector<CheckedRequirement> RunStyle(const std::string& first, const std::st
                                          int styles_after, double begin, RunContext* context) {
   const RunSettings& settings = context->settings;
   const std::string &name = settings.style.name, &until = settings.start.until;
-  Workspace workspace(folder, settings.start.break_lock);
+  Workspace workspace(folder);
   context->style = &workspace;
   // From its beginning on the folder belongs to this picture.
   if (!std::filesystem::exists(workspace.Path("run.json"))) WriteRunFile("run", *context);
-  if (context->parts.join) PrepareJoin(context);
+  if (context->parts.Join()) PrepareJoin(context);
   RunPipeline(first, until, context, styles_after);
-  if (context->parts.join && !settings.start.dry_run)
+  if (context->parts.Join() && !settings.start.dry_run)
     DropParts(RenderStage(context).inputs, *context);
   std::vector<CheckedRequirement> checked;
   if (!settings.start.dry_run) {
@@ -233,7 +233,6 @@ void RunStyles(const std::string& first, const std::vector<NamedStyle>& styles,
 
 void RunPart(const std::string& style, RunContext* context) {
   const std::string path = StyleFolder(context->settings.run.out, style);
-  if (context->settings.start.break_lock) Workspace(path, true);
   Workspace folder(path, Workspace::BesideOthers());
   context->style = &folder;
   context->settings.style.name = style;

@@ -30,7 +30,8 @@ struct IngestOptions {
   template <typename Bind>
   void Describe(Bind& bind) {
     bind("accept-damaged", accept_damaged,
-         {.help = "uses JPEG photos with lost parts instead of leaving them out"});
+         {.help = "uses JPEG photos with lost parts instead of leaving them out",
+          .constant = true});
     bind("max-megapixels", max_megapixels,
          {.unit = "megapixels",
           .help = "leaves larger photos out; reading one needs 16 bytes a pixel",

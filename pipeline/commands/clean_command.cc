@@ -44,7 +44,7 @@ std::vector<Removable> RemovableIn(const std::string& folder) {
     all.push_back({style + "/frames", "`regrade render` makes them again"});
     all.push_back({style + "/" + kPartsFolder, "`regrade render --part` makes them again"});
     all.push_back(
-        {style + "/field_2d.npz", "made again by `regrade evaluate --control-field`"});
+        {style + "/field_2d.npz", "made again by `regrade evaluate --controls field`"});
     all.push_back({style + "/styled.npz", "of an earlier version; `regrade export` writes it"});
     all.push_back({style + "/.regrade/checkpoints",
                    "a stage that was interrupted would begin from its start"});

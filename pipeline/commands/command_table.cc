@@ -20,7 +20,7 @@ const std::vector<Command>& AllCommands() {
        "fits the splats of a finished reconstruction in more detail, block by block: for "
        "scenes that do not fit into memory, and for several machines",
        RunRefine,
-       "blocks part join preset splats splat-steps photo-size max-memory device dry-run "
+       "blocks part preset splats splat-steps photo-size max-memory device dry-run "
        "verbose"},
       {"stylize", "DIR --style PICTURE [PICTURE ...] [OPTIONS]",
        "applies further styles to a finished reconstruction, each in DIR/styles/NAME",
@@ -29,30 +29,31 @@ const std::vector<Command>& AllCommands() {
        "restart-from dry-run verbose"},
       {"retouch", "DIR --photo NAME [--from render] [--edited PICTURE] [OPTIONS]",
        "lets the scene follow one retouched photo, as a style in DIR/styles/NAME", RunRetouch,
-       "photo edited from keep-vignette preset name strength film-seconds film-size device "
+       "photo edited from vignette preset name strength film-seconds film-size device "
        "dry-run verbose"},
       {"render", "DIR [OPTIONS] | DIR --path FILE.json [OPTIONS]",
        "renders and measures a styled scene again, or renders the film of a page's camera path",
        RunRender,
-       "still size format name strength path film-seconds film-size fps part join until device "
+       "photo size format name strength path film-seconds film-size fps part until device "
        "dry-run verbose"},
       {"mix", "DIR [NAME|STYLED.npz ...] --out FOLDER [OPTIONS]",
        "makes a film that blends from the unstyled scene into one or more styles", RunMix},
       {"contact-sheet", "DIR [NAME...] --out FILE.png [OPTIONS]",
        "makes one picture that compares the styles of a folder", RunContactSheet},
       {"evaluate",
-       "DIR [OPTIONS] | --frames DIR [DIR ...] [--label TEXT ...] [--reference DIR] "
+       "DIR [OPTIONS] | --frames DIR [DIR ...] [--name TEXT ...] [--reference DIR] "
        "[--target DIR] [--style PICTURE] | --splats FILE [FILE ...] --reference FILE "
        "[--cameras CAPTURE]",
        "measures consistency and fidelity, of a run or of any program's frames or splats",
        RunEvaluate},
-      {"study", "A B [C ...] --out FILE.html [OPTIONS] | --analyse ANSWERS.json ...",
-       "makes a page that asks people which film they prefer, and analyses their answers",
+      {"study", "A B [C ...] --out FILE.html [OPTIONS] | ANSWERS.json ...",
+       "makes a page that asks people which film they prefer; of their answers it tells "
+       "preference "
+       "shares with intervals, Bradley-Terry strengths, and a test of each pair",
        RunStudy},
       {"tradeoff", "PHOTOS|CAPTURE|DIR --out DIR [--style PICTURE] [OPTIONS]",
        "measures on this machine how each parameter trades time for accuracy", RunTradeoff,
-       "out preset style parameters presets repeats budget with-poses dry-run "
-       "verbose"},
+       "out preset style parameters presets repeats budget dry-run verbose"},
       {"synth", "OUT [OPTIONS]", "writes a synthetic capture with its exact ground truth",
        RunSynth},
       {"export", "DIR --out FOLDER|LOOK.cube [OPTIONS]",
@@ -68,7 +69,7 @@ const std::vector<Command>& AllCommands() {
        RunClean},
       {"networks", "list | remove NAME",
        "lists or removes the networks that `--method pca-kd` fetched", RunNetworks},
-      {"manual", "[OPTIONS]", "prints the man page, or bash's completion", RunManual},
+      {"manual", "[bash]", "prints the man page, or bash's completion", RunManual},
       {"doctor", "[OPTIONS]", "prints what is installed and which processor runs what",
        RunDoctor},
   };

@@ -16,11 +16,10 @@ void Continue(const std::string& folder, const Prepared& prepared,
   settings.run.out = AbsolutePath(folder);
   CheckTogether(settings);
   // Other styles of the scene may be worked on beside this one, and of a style its parts.
-  if (settings.start.break_lock) Workspace(folder, true);
   Workspace workspace(folder, Workspace::BesideOthers());
   context->workspace = &workspace;
   context->console->OpenLog(workspace.Path(".regrade/log.txt"));
-  if (context->parts.part.empty())
+  if (!context->parts.One())
     RunStyles(first, styles, context);
   else
     RunPart(styles[0].name, context);
@@ -42,11 +41,8 @@ void ContinueStyle(const Command& command, const Arguments& arguments, const std
   if (settings.style.pictures.size() > 1 && !settings.style.match.On())
     throw UsageError("continues one style", std::string("regrade ") + command.name,
                      "name it with --name");
-  if (const auto part = context.options.Given("part")) {
-    ParsePart(*part);
-    if (context.parts.join)
-      throw UsageError("goes without --part", "--join",
-                       "render every part first, then join them");
+  if (context.parts.One()) {
+    ParsePart(context.parts.part);
     if (!settings.start.restart_from.empty())
       throw UsageError("goes without --part", "--restart-from",
                        "remove parts/ of the style's folder to render parts again");
@@ -77,7 +73,6 @@ void RunStylize(const Command& command, const Arguments& arguments, Console* con
   // That of the run belongs to its pictures.
   const bool other = context.options.Given("style") || prepared->words.size() > 1;
   if (other && !context.options.Given("match")) style.match.match = MatchChoice().match;
-  if (other && !context.options.Given("match-network")) style.match.network.clear();
   ProbeStyles(&context.settings, console);
   Continue(folder, *prepared, NameStyles(folder, style.pictures, style.name, style.match.On()),
            "style_2d", &context);

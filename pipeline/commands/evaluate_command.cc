@@ -9,7 +9,7 @@
 namespace regrade {
 namespace {
 
-// "--frames A B C" as three flags, and "--splats" and "--label" in the same way.
+// "--frames A B C" as three flags, and "--splats" and "--name" in the same way.
 Arguments SpreadLists(const Arguments& words) {
   Arguments spread;
   std::string list;  // the flag that further words belong to
@@ -30,7 +30,7 @@ Arguments SpreadLists(const Arguments& words) {
       spread.insert(spread.end(), words.begin() + static_cast<std::ptrdiff_t>(i), words.end());
       return spread;
     }
-    for (const std::string flag : {"--frames", "--splats", "--label"}) {
+    for (const std::string flag : {"--frames", "--splats", "--name"}) {
       if (word == flag || word.starts_with(flag + "=")) list = flag, any = word != flag;
     }
     if (list.empty() || any) spread.push_back(word);
@@ -67,9 +67,10 @@ void RunEvaluate(const Command& command, const Arguments& words, Console* consol
   if (frames.frames.empty())
     throw UsageError("there is nothing to compare with the reference", "--reference",
                      "add --frames DIR, or --splats FILE");
-  for (const char* flag : {"cameras", "up", "background", "size"})
+  for (const char* flag : {"up", "background", "size"})
     if (options.Given(flag))
       throw UsageError("belongs to --splats", std::string("--") + flag, "leave it out");
+  frames.cameras = splats.views.cameras;
   EvaluateFrames(frames, consistency, words, console);
 }
 

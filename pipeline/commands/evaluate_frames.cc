@@ -33,30 +33,30 @@ namespace {
 
 void CheckTogether(const FramesOptions& frames, const ConsistencyOptions& options) {
   const bool geometry = options.mode == "geometry";
-  if (geometry && (frames.poses.empty() || frames.depth.empty() || frames.reference.empty()))
+  if (geometry && (frames.cameras.empty() || frames.depth.empty() || frames.reference.empty()))
     throw UsageError("frames of other programs have no geometry of their own", "--mode",
-                     "add --reference, --poses and --depth, or use lai2018 or ruder2016");
+                     "add --reference, --cameras and --depth, or use lai2018 or ruder2016");
   for (const auto& [flag, value] :
-       {std::pair{"--poses", frames.poses}, {"--depth", frames.depth}})
+       {std::pair{"--cameras", frames.cameras}, {"--depth", frames.depth}})
     if (!geometry && !value.empty())
       throw UsageError("motion is estimated in mode " + options.mode, flag,
                        "leave it out, or use --protocol geometry");
-  if (options.control_field)
-    throw UsageError("a field is fitted for runs of regrade only", "--control-field",
+  if (options.HasControlField())
+    throw UsageError("a field is fitted for runs of regrade only", "--controls field",
                      "leave it out, or evaluate the folder of a run");
   if (!options.edges.empty() && frames.reference.empty())
-    throw UsageError("edges are compared with the unstyled frames'", "--edges",
+    throw UsageError("edges are compared with the unstyled frames'", "edges",
                      "add --reference");
   if (frames.frames.size() > 1 && frames.reference.empty())
     throw UsageError("folders are compared by the motion of one reference", "--frames",
                      "add --reference, or give one folder");
-  if (!frames.label.empty() && frames.label.size() != frames.frames.size())
+  if (!frames.names.empty() && frames.names.size() != frames.frames.size())
     throw UsageError(
-        Concat(frames.label.size(), " labels for ", frames.frames.size(), " folders of frames"),
-        "--label", "give one for each");
-  if (std::set<std::string>(frames.label.begin(), frames.label.end()).size() !=
-      frames.label.size())
-    throw UsageError("two folders have the same label", "--label", "give each its own");
+        Concat(frames.names.size(), " names for ", frames.frames.size(), " folders of frames"),
+        "--name", "give one for each");
+  if (std::set<std::string>(frames.names.begin(), frames.names.end()).size() !=
+      frames.names.size())
+    throw UsageError("two folders have the same name", "--name", "give each its own");
   if (!frames.junit.empty() && frames.require.empty())
     throw UsageError("there are no requirements to report", "--junit", "add --require");
 }
@@ -151,7 +151,7 @@ void AddSequences(const FramesOptions& frames, const ConsistencyOptions& options
   for (size_t i = 0; i < folders->styled.size(); ++i)
     measured->sequences.push_back({StyledName(i), folders->styled[i].Source()});
   OpenNetworks(options, &targets);
-  if (!options.controls) return;
+  if (!options.HasControls()) return;
   const bool has_reference = folders->reference.has_value();
   const ControlInputs inputs{reference, folders->styled[0].Source(), targets.views_2d,
                              targets.style, has_reference};
@@ -213,11 +213,11 @@ TableContext ContextOf(const FramesOptions& frames, const ConsistencyOptions& op
                        const std::vector<std::string>& remarks) {
   TableContext context;
   context.remarks = remarks;
-  context.form = frames.table;
+  context.form = frames.format;
   context.protocol = ProtocolOf(options);
   context.version = REGRADE_VERSION;
-  for (size_t i = 0; i < frames.label.size(); ++i)
-    context.labels[StyledName(i)] = frames.label[i];
+  for (size_t i = 0; i < frames.names.size(); ++i)
+    context.labels[StyledName(i)] = frames.names[i];
   for (const MissingControl& control : missing)
     context.remarks.push_back(control.sequence + ": left out, " + control.why);
   return context;
@@ -254,7 +254,7 @@ void EvaluateFrames(const FramesOptions& frames, const ConsistencyOptions& given
   GeometrySource geometry;
   std::vector<std::string> notices;
   if (options.mode == "geometry")
-    geometry = GivenGeometry(frames.poses, frames.depth, *folders.Moving(), &notices);
+    geometry = GivenGeometry(frames.cameras, frames.depth, *folders.Moving(), &notices);
   for (const std::string& notice : notices) console->Warn(notice);
   Measured measured;
   AddSequences(frames, options, &folders, &measured);

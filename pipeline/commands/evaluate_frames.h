@@ -13,9 +13,10 @@
 namespace regrade {
 
 struct FramesOptions {
-  std::vector<std::string> frames, label;
-  std::string reference, target, style, poses, depth, out, protocol, table = "text", require,
-                                                                     junit;
+  std::vector<std::string> frames, names;
+  std::string cameras;  // of --cameras, which files of splats have, too
+  std::string reference, target, style, depth, out, protocol, format = "text", require, junit,
+                                                              config;
 
   template <typename Bind>
   void Describe(Bind& bind) {
@@ -25,9 +26,9 @@ struct FramesOptions {
               "several folders, one after the other, are compared with the first one, pair by "
               "pair"});
     bind(
-        "label", label,
+        "name", names,
         {.help = "what tables call each of --frames or --splats, in the same order; without it "
-                 "styled, styled_2, ..."});
+                 "styled, styled_2, ... Of a run: the style, by default the last one"});
     bind("reference", reference,
          {.help = "folder with the same frames before styling; motion and masks come from "
                   "them. Frames belong together by the numbers in their names, or else by "
@@ -36,23 +37,22 @@ struct FramesOptions {
     bind("target", target,
          {.help = "folder with the 2D method's version of each frame, for fidelity"});
     bind("style", style, {.help = "style picture, for fidelity"});
-    bind("poses", poses,
-         {.help = "of --mode geometry: a transforms.json with the camera of each frame of "
-                  "--reference"});
     bind("depth", depth,
          {.help = "of --mode geometry: folder with a depth map of each frame of --reference, "
-                  ".npy of height x width, along the optical axis in the unit of --poses"});
+                  ".npy of height x width, along the optical axis in the unit of --cameras"});
     // Stands for other options, which ExpandProtocol() puts in its place.
     bind("protocol", protocol,
          {.help = "a published protocol by name, also for runs: sets --mode, --gaps and "
                   "--warp where it says so, and refuses others; geometry of frames needs "
-                  "--poses and --depth; evaluate/PROTOCOLS.md defines each",
+                  "--cameras and --depth; evaluate/PROTOCOLS.md defines each",
           .choices = ProtocolChoices()});
-    bind("table", table,
+    bind("format", format,
          {.help = "form of the printed tables; latex needs the package booktabs",
           .choices = kTableForms});
     bind("require", require, {.help = kRequireHelp});
     bind("junit", junit, {.help = kJUnitHelp});
+    bind("config", config,
+         {.help = "{\"NAME\": VALUE, ...} of --help-constants, in a file or here"});
     bind("out", out,
          {.help = "folder for report.html, report.json, heatmaps/ of the worst pairs and, of "
                   "--splats, rendered/ with the frames"});

@@ -24,9 +24,8 @@ void CheckSplats(const SplatsOptions& splats, const FramesOptions& frames) {
   if (frames.reference.empty())
     throw UsageError("styled splats are compared with those before styling", "--splats",
                      "add --reference FILE");
-  for (const auto& [flag, given] : {std::pair{"--frames", !frames.frames.empty()},
-                                    {"--poses", !frames.poses.empty()},
-                                    {"--depth", !frames.depth.empty()}})
+  for (const auto& [flag, given] :
+       {std::pair{"--frames", !frames.frames.empty()}, {"--depth", !frames.depth.empty()}})
     if (given)
       throw UsageError("frames of --splats are rendered here", flag,
                        "leave it out, or evaluate the frames of OUT/rendered with it");
@@ -52,7 +51,7 @@ void EvaluateSplats(const SplatsOptions& splats, FramesOptions frames,
     frames.frames.push_back(inside + StyledName(k));
   frames.reference = inside + kReferenceFrames;
   if (options.mode == "geometry") {
-    frames.poses = inside + kFrameCameras;
+    frames.cameras = inside + kFrameCameras;
     frames.depth = inside + kReferenceDepth;
   }
   EvaluateFrames(frames, options, words, console, [&] {

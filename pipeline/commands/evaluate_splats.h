@@ -22,7 +22,12 @@ struct SplatsOptions {
                   "the splats of --reference; several files, one after the other, as several "
                   "folders of --frames. Motion is exact unless --mode or --protocol says "
                   "otherwise"});
-    views.Describe(bind);
+    bind("cameras", views.cameras,
+         {.help =
+              "of --splats: a capture whose cameras are in their world, as of `regrade run`; "
+              "without it views are placed by measurement. Of --frames with --mode geometry: "
+              "a transforms.json with the camera of each frame of --reference"});
+    bind("up", views.up, {.help = kUpHelp, .choices = kUps});
     bind("background", background,
          {.help =
               "of --splats: the colour behind them, which files do not have; auto is that of "

@@ -2,19 +2,11 @@
 // options.
 #include <cstdio>
 
+#include "kernels/base/error.h"
 #include "pipeline/commands/command.h"
 
 namespace regrade {
 namespace {
-
-struct ManualOptions {
-  bool bash = false;
-
-  template <typename Bind>
-  void Describe(Bind& bind) {
-    bind("bash", bash, {.help = "prints the completion of bash in place of the man page"});
-  }
-};
 
 void PrintManPage(Console* console) {
   std::printf(".TH REGRADE 1 \"\" \"regrade " REGRADE_VERSION
@@ -62,16 +54,16 @@ void PrintCompletion(Console* console) {
 }  // namespace
 
 void RunManual(const Command& command, const Arguments& arguments, Console* console) {
-  ManualOptions manual;
   ProgramOptions program;
   OptionSet options;
-  options.Add("Manual", &manual);
   options.Add("Program", &program);
-  if (!Prepare(command, arguments, {.least_words = 0, .most_words = 0}, &options)) return;
-  if (manual.bash)
-    PrintCompletion(console);
-  else
-    PrintManPage(console);
+  const auto prepared = Prepare(command, arguments, {.least_words = 0}, &options);
+  if (!prepared) return;
+  if (prepared->words.empty()) return PrintManPage(console);
+  if (prepared->words[0] != "bash")
+    throw UsageError("'" + prepared->words[0] + "' is no shell", "regrade manual",
+                     "use regrade manual bash");
+  PrintCompletion(console);
 }
 
 }  // namespace regrade

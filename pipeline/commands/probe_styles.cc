@@ -32,9 +32,10 @@ void ProbeStyles(RunSettings* settings, Console* console) {
       console->Warn(picture + ": " + SlopeText(lut));
   }
   CheckMatch(*settings);
-  if (std::string& network = settings->style.match.network; !network.empty()) {
-    network = AbsolutePath(network);
-    ProbeFeatureNetwork(network);
+  MatchChoice& match = settings->style.match;
+  if (const std::string network = match.Network(); !network.empty()) {
+    match.SetNetwork(AbsolutePath(network));
+    ProbeFeatureNetwork(match.Network());
   }
   const StartOptions& start = settings->start;
   ProbeMethod(&settings->style_2d,

@@ -98,7 +98,7 @@ void Refine(RunContext* context) {
   const RefineOptions& refine = context->refine;
   Console* const console = context->console;
   const bool dry_run = context->settings.start.dry_run;
-  if (refine.part.empty() && !dry_run) RepairField(*context);
+  if (!refine.One() && !dry_run) RepairField(*context);
   const BlockFolder folder(*context, refine.blocks);
   if (folder.IsJoined()) return console->Info("refine: done before");
   const std::vector<int> missing = folder.Missing();
@@ -106,11 +106,11 @@ void Refine(RunContext* context) {
     return console->Info(missing.empty()
                              ? "refine: no block is left to make"
                              : "refine: would make " + BlocksText(missing, folder.blocks()));
-  if (missing.empty() && !refine.part.empty())
+  if (missing.empty() && refine.One())
     console->Info("refine: no block is left to make");
-  else if (!missing.empty() && !refine.join)
+  else if (!missing.empty() && !refine.Join())
     MakeBlocks(context, folder);
-  if (!refine.part.empty()) return;
+  if (refine.One()) return;
   JoinBlocks(context, folder);
   const int size = context->settings.scene.photo_size;
   const int64_t of_run =
@@ -131,21 +131,15 @@ void RunRefine(const Command& command, const Arguments& arguments, Console* cons
   if (!prepared) return;
   RunSettings& settings = context.settings;
   const RefineOptions& refine = context.refine;
-  if (!refine.part.empty()) {
-    ParsePart(refine.part);
-    if (refine.join)
-      throw UsageError("goes without --part", "--join",
-                       "make every part first, then join them");
-  }
+  if (refine.One()) ParsePart(refine.part);
   if (!prepared->run_words.empty()) context.source = prepared->run_words[0];
   settings.run.out = AbsolutePath(prepared->words[0]);
   CheckTogether(settings);
   const auto effects = ParseEffects(settings.run.effects);
   if (const auto view = effects.find(kViewDependence); view != effects.end() && !view->second)
     settings.splats.sh_degree = 0;
-  if (settings.start.break_lock) Workspace(settings.run.out, true);
   std::optional<Workspace> workspace;
-  if (refine.part.empty())
+  if (!refine.One())
     workspace.emplace(settings.run.out);
   else
     workspace.emplace(settings.run.out, Workspace::BesideOthers());

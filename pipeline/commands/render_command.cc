@@ -23,13 +23,13 @@ namespace regrade {
 namespace {
 
 struct StillOptions {
-  std::vector<std::string> still;
+  std::vector<std::string> photos;
   int size = 0;
   std::string format = "png";
 
   template <typename Bind>
   void Describe(Bind& bind) {
-    bind("still", still,
+    bind("photo", photos,
          {.help = "name of a photo: renders the styled scene from its place to stills/ in the "
                   "style's folder, and nothing else; may be given more than once"});
     bind("size", size,
@@ -97,7 +97,7 @@ void RenderStills(const std::string& folder, const std::string& name,
   const Vignette vignette = ParseVignette(settings.render.vignette);
   std::vector<int> wanted;
   std::vector<Camera> cameras;
-  for (const std::string& still : options.still) {
+  for (const std::string& still : options.photos) {
     wanted.push_back(PhotoNamed(views.capture(), still));
     cameras.push_back(views.CameraOf(wanted.back()));
   }
@@ -160,7 +160,7 @@ void RenderPath(const Command& command, const Arguments& arguments, Console* con
 void RunRender(const Command& command, const Arguments& arguments, Console* console) {
   if (NamesPathFile(arguments)) return RenderPath(command, arguments, console);
   const bool stills = std::ranges::any_of(arguments, [](const std::string& word) {
-    return word == "--still" || word.starts_with("--still=");
+    return word == "--photo" || word.starts_with("--photo=");
   });
   if (!stills && !AsksForHelp(arguments))
     return ContinueStyle(command, arguments, "render", console);
@@ -173,11 +173,11 @@ void RunRender(const Command& command, const Arguments& arguments, Console* cons
   settings.Bind(&options);
   const auto prepared = Prepare(command, arguments, {.continues_style = true}, &options);
   if (!prepared) return;
-  if (parts.On()) throw UsageError("goes without --part and --join", "--still");
+  if (!parts.part.empty()) throw UsageError("goes without --part", "--photo");
   const std::string& folder = prepared->words[0];
   const std::string name = ChosenLearnedStyle(folder, options.Given("name").value_or(""));
   if (settings.start.dry_run) {
-    console->Info(Concat(Counted(std::ssize(still.still), "still"), " of style ", name,
+    console->Info(Concat(Counted(std::ssize(still.photos), "still"), " of style ", name,
                          " would be written to ", StyleFolder(folder, name), "/stills"));
     return;
   }

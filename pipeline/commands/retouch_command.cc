@@ -30,11 +30,12 @@ namespace fs = std::filesystem;
 
 // In the output folder: renders to be edited.
 constexpr char kRenders[] = "retouch";
+// Of --vignette.
+constexpr char kVignetteOfEdit[] = "edit";
 
 struct RetouchOptions {
   std::string photo, edited;
   std::string from = "photo";
-  bool keep_vignette = false;
 
   template <typename Bind>
   void Describe(Bind& bind) {
@@ -45,9 +46,6 @@ struct RetouchOptions {
          {.help = "what was edited: the photo, or the scene's render from its place, which is "
                   "written to retouch/ of DIR, as a TIFF of 16 bits, where --edited is missing",
           .choices = "photo|render"});
-    bind("keep-vignette", keep_vignette,
-         {.help = "puts the edit's vignette onto the style's films and stills; the scene has "
-                  "none in either case"});
   }
 };
 
@@ -75,7 +73,7 @@ int ViewOf(const WorkingViews& views, const std::string& name) {
       "name one of them: " + Join(some, ", ") + (views.count() > 5 ? ", ..." : ""));
 }
 
-JsonValue RecordOf(const RetouchOptions& options, const PhotoEdit& edit,
+JsonValue RecordOf(const RetouchOptions& options, const PhotoEdit& edit, bool keeps_vignette,
                    const std::vector<std::string>& notices) {
   JsonValue::Array said;
   for (const std::string& notice : notices) said.push_back(notice);
@@ -86,7 +84,7 @@ JsonValue RecordOf(const RetouchOptions& options, const PhotoEdit& edit,
                            {"local", edit.local},
                            {"of_photo", edit.of_photo},
                            {"vignette", edit.vignette(1)},
-                           {"keep_vignette", options.keep_vignette},
+                           {"keep_vignette", keeps_vignette},
                            {"sharpening", edit.sharpening},
                            {"grain", edit.grain},
                            {"steepest_slope", SteepestSlope(edit.table)},
@@ -182,9 +180,14 @@ void RunRetouch(const Command& command, const Arguments& arguments, Console* con
                      "choose another name");
   if (!prepared->run_words.empty()) context.source = prepared->run_words[0];
   settings.run.out = AbsolutePath(folder);
+  // Not the vignette of the run's own style.
+  std::string& vignette = settings.render.vignette;
+  vignette = given.options.Given("vignette").value_or("none");
+  const bool keeps_vignette = vignette == kVignetteOfEdit;
+  if (keeps_vignette) vignette = "none";
   CheckTogether(settings);
 
-  Workspace workspace(folder, settings.start.break_lock);
+  Workspace workspace(folder);
   context.workspace = &workspace;
   console->OpenLog(workspace.Path(".regrade/log.txt"));
   CheckResults(folder, {});
@@ -206,9 +209,9 @@ void RunRetouch(const Command& command, const Arguments& arguments, Console* con
     edited = views.AsSeen(view, std::move(edited));
   }
   const PhotoEdit edit = AnalyseEdit(photo, edited);
-  const std::vector<std::string> notices = EditNotices(edit, retouch.keep_vignette);
+  const std::vector<std::string> notices = EditNotices(edit, keeps_vignette);
   for (const std::string& notice : notices) console->Info(notice);
-  settings.render.vignette = retouch.keep_vignette ? VignetteText(edit.vignette) : "none";
+  if (keeps_vignette) vignette = VignetteText(edit.vignette);
   UseEdit(style, edit, &settings);
   if (settings.start.dry_run) {
     PlanStyles("style_2d", {{name, settings.style.pictures}}, &context);
@@ -218,7 +221,7 @@ void RunRetouch(const Command& command, const Arguments& arguments, Console* con
   if (!edit.IsLocal())
     console->Info("the map of colours is " + style + "/" + kEditLut +
                   ", a LUT for other programs");
-  WriteJsonFile(style + "/" + kRetouchRecord, RecordOf(retouch, edit, notices));
+  WriteJsonFile(style + "/" + kRetouchRecord, RecordOf(retouch, edit, keeps_vignette, notices));
   RunStyles("style_2d", {{name, settings.style.pictures}}, &context);
 }
 

@@ -78,7 +78,7 @@ void RunStages(const Command& command, const Arguments& arguments, Console* cons
     return RunStyles("style_2d", styles, &context);
   }
   if (!settings.start.dry_run) BeginJUnit(settings.start.junit);
-  Workspace workspace(settings.run.out, settings.start.break_lock);
+  Workspace workspace(settings.run.out);
   context.workspace = &workspace;
   console->OpenLog(workspace.Path(".regrade/log.txt"));
   // Later commands take their options from it, also after an interruption.

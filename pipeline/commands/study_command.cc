@@ -1,4 +1,6 @@
 // regrade study: a page that asks which film people prefer, and what their answers show.
+#include <algorithm>
+
 #include "kernels/base/error.h"
 #include "pipeline/commands/command.h"
 #include "pipeline/files/atomic_file.h"
@@ -11,18 +13,19 @@ namespace {
 
 struct StudyFileOptions {
   std::string out;
-  bool analyse = false;
 
   template <typename Bind>
   void Describe(Bind& bind) {
     bind("out", out,
-         {.help = "the page to write; with --analyse a JSON file of the analysis, if wanted"});
-    bind(
-        "analyse", analyse,
-        {.help = "reads the answers that participants saved: preference shares with intervals, "
-                 "Bradley-Terry strengths, and a test of each pair"});
+         {.help = "the page to write; of answers a JSON file of their analysis, if wanted"});
   }
 };
+
+// The files that participants saved, instead of films?
+bool AreAnswers(const Arguments& words) {
+  return std::ranges::all_of(words,
+                             [](const std::string& word) { return word.ends_with(".json"); });
+}
 
 }  // namespace
 
@@ -38,7 +41,7 @@ void RunStudy(const Command& command, const Arguments& arguments, Console* conso
   const auto prepared =
       Prepare(command, arguments, {.most_words = kMostParticipants}, &options);
   if (!prepared) return;
-  if (file.analyse) {
+  if (AreAnswers(prepared->words)) {
     const JsonValue analysis = AnalyseStudy(ReadStudyAnswers(prepared->words));
     console->Event("study", analysis);
     console->Lines(FormatStudy(analysis));

@@ -40,12 +40,12 @@ struct TradeoffOptions {
   std::string parameters, presets = "draft,standard";
   int repeats = 3;
   double budget = 0;
-  bool with_poses = false;
 
   template <typename Bind>
   void Describe(Bind& bind) {
     bind("parameters", parameters,
-         {.help = "measure only these, comma-separated; empty measures all"});
+         {.help = "measure only these, comma-separated; empty measures all but "
+                  "pose-image-size, which photos without poses have"});
     bind("presets", presets,
          {.help =
               "presets to measure as well, comma-separated; expensive and measured last; none "
@@ -62,8 +62,6 @@ struct TradeoffOptions {
                   "is made to its end; the same command continues; 0 has no limit",
           .min = 0,
           .max = 1e6});
-    bind("with-poses", with_poses,
-         {.help = "also measure COLMAP's parameters, if photos without poses are given"});
   }
 };
 
@@ -305,8 +303,7 @@ void RunTradeoff(const Command& command, const Arguments& arguments, Console* co
                                         ? NetworkAccess()
                                         : AccessAfterYes(settings.start.yes, console));
   }
-  ParameterChoice choice{Words(tradeoff.parameters),
-                         tradeoff.with_poses && source.kind == CaptureKind::kPhotos, style,
+  ParameterChoice choice{Words(tradeoff.parameters), source.kind == CaptureKind::kPhotos, style,
                          Words(tradeoff.presets)};
   const std::string base_name = BaseName(settings, base.options, &choice.presets);
   const std::vector<Variant> variants = VariantsOf(settings, choice);
@@ -331,7 +328,7 @@ void RunTradeoff(const Command& command, const Arguments& arguments, Console* co
   settings.run.device = "cpu";
   const std::string folder = AbsolutePath(settings.run.out);
   settings.run.out = folder + "/base";
-  Workspace workspace(settings.run.out, settings.start.break_lock);
+  Workspace workspace(settings.run.out);
   base.workspace = &workspace;
   console->OpenLog(workspace.Path(".regrade/log.txt"));
   budget.seconds = 60 * tradeoff.budget;

@@ -90,7 +90,8 @@ StoredPicture ReadJpeg(std::string_view bytes, const std::string& where,
                                     " warnings, first: ", jpeg.first_warning, ")");
     if (!limits.accept_damaged)
       throw InputError(what, where,
-                       "copy the file again from the camera, or keep it with --accept-damaged");
+                       "copy the file again from the camera, or keep it with --config "
+                       "'{\"accept-damaged\":true}'");
     picture.notices.push_back(what);
   }
   TakeExif(jpeg.exif, &picture);

@@ -24,10 +24,6 @@ struct ProgramOptions {
   }
 };
 
-inline constexpr char kPaperConfigHelp[] =
-    "of --preset paper: the configuration of Plenoxels' code. auto takes syn for transparent "
-    "photos, llff for forward-facing captures, else custom";
-
 inline constexpr char kMaxMemoryHelp[] =
     "limit on planned memory, of 10^9 bytes; 0 takes what is free";
 
@@ -50,7 +46,10 @@ struct RunOptions {
          {.help = "trade-off between accuracy and time; smoke only shows that everything runs",
           .choices = "smoke|draft|standard|paper|best"});
     bind("paper-config", paper_config,
-         {.help = kPaperConfigHelp, .choices = "auto|syn|llff|tnt|custom"});
+         {.help = "of --preset paper: the configuration of Plenoxels' code. auto takes syn for "
+                  "transparent photos, llff for forward-facing captures, else custom",
+          .choices = "auto|syn|llff|tnt|custom",
+          .constant = true});
     bind("device", device,
          {.help = "the processor for fits, restyling and frames; cuda:1 is the second card",
           .choices = "auto|cpu|cuda"});
@@ -90,7 +89,6 @@ struct StartOptions {
   std::string until = "report";
   std::string require, junit;
   bool dry_run = false;
-  bool break_lock = false;
   bool yes = false;
 
   template <typename Bind>
@@ -114,8 +112,6 @@ struct StartOptions {
     bind("junit", junit, {.help = kJUnitHelp, .once = true});
     bind("dry-run", dry_run,
          {.help = "prints what would be done, and does nothing", .once = true});
-    bind("break-lock", break_lock,
-         {.help = "takes over a folder whose last run died on another machine", .once = true});
     bind("yes", yes,
          {.help = "answers yes: fetches what --method pca-kd needs, and runs and reads what a "
                   "folder's run.json names outside of it",

@@ -1,28 +1,28 @@
-// --part and --join: the frames and films of a style made by several processes or machines.
+// --part: the frames and films of a style made by several processes or machines.
 #pragma once
 
 #include <string>
 
 namespace regrade {
 
+inline constexpr char kJoinParts[] = "join";
+
 struct FilmParts {
   std::string part;
-  bool join = false;
 
   template <typename Bind>
   void Describe(Bind& bind) {
     bind("part", part,
          {.help = "K/N renders the K-th of N parts of the frames and films, to parts/ of the "
                   "style's folder, and nothing else; parts may be rendered at the same time, "
-                  "on any machines that share the folder",
+                  "on any machines that share the folder. join makes frames and films of the "
+                  "parts instead of rendering, and goes on; their bytes do not depend on how "
+                  "many there were",
           .once = true});
-    bind(
-        "join", join,
-        {.help = "makes frames and films of the parts instead of rendering, and goes on; their "
-                 "bytes do not depend on how many there were",
-         .once = true});
   }
-  bool On() const { return join || !part.empty(); }
+  bool Join() const { return part == kJoinParts; }
+  // One of several parts, and nothing else.
+  bool One() const { return !part.empty() && !Join(); }
 };
 
 struct PartNumber {

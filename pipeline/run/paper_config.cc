@@ -143,7 +143,7 @@ std::string Text(const JsonValue& value) {
 void UsePaperConfig(const std::string& name, RunSettings* settings) {
   const auto found = std::ranges::find(kConfigs, name, &Config::name);
   if (found == std::end(kConfigs))
-    throw UsageError("'" + name + "' is not allowed", "--paper-config",
+    throw UsageError("'" + name + "' is not allowed", kPaperConfig,
                      "give one of auto, syn, llff, tnt, custom");
   settings->scene.box = BoxOptions();
   settings->fit = FitOptions();
@@ -186,11 +186,11 @@ JsonValue ProtocolValues(const RunSettings& settings) {
 PaperChoice ChoosePaperConfig(const std::string& asked, const PaperTraits& traits) {
   if (asked == "syn" && !traits.transparent)
     throw UsageError("syn needs photos with transparent parts, and these have none",
-                     "--paper-config syn", "leave the choice to auto, or use custom");
+                     "paper-config syn", "leave the choice to auto, or use custom");
   if (asked == "llff" && !traits.forward_facing)
     throw UsageError("llff needs cameras that all look one way, and these do not",
-                     "--paper-config llff", "leave the choice to auto, or use custom");
-  if (asked != "auto") return {asked, "by --paper-config"};
+                     "paper-config llff", "leave the choice to auto, or use custom");
+  if (asked != "auto") return {asked, Concat("by ", kPaperConfig)};
   if (traits.transparent) return {"syn", "the photos have transparent parts"};
   if (traits.forward_facing) return {"llff", "the cameras all look one way"};
   return {"custom", "the photos are opaque, and the cameras look in several directions"};
@@ -198,7 +198,7 @@ PaperChoice ChoosePaperConfig(const std::string& asked, const PaperTraits& trait
 
 void CheckPaper(const std::string& preset, const std::string& config) {
   if (preset != "paper" && config != "auto")
-    throw UsageError("is a choice within --preset paper", "--paper-config",
+    throw UsageError("is a choice within --preset paper", kPaperConfig,
                      "add --preset paper, or leave it out");
 }
 
@@ -208,10 +208,10 @@ void ApplyPaperChoice(const PaperChoice& choice, OptionSet* options) {
   for (const auto& [name, value] : chosen.AsObject()) {
     const std::string& by = options->SetBy(name);
     const bool is_preset =
-        by.empty() || by == "--paper-config" || by.starts_with(OptionSet::kPresetOf);
+        by.empty() || by == kPaperConfig || by.starts_with(OptionSet::kPresetOf);
     if (now.Find(name) != nullptr && is_preset) set[name] = value;
   }
-  options->ApplyConfig(set, "--paper-config");
+  options->ApplyConfig(set, kPaperConfig);
 }
 
 std::vector<std::string> NotToTheLetter(const std::string& name, const JsonValue& values) {

@@ -14,6 +14,7 @@ namespace regrade {
 inline constexpr const char* kPaperConfigs[] = {"syn", "llff", "tnt", "custom"};
 // What --preset paper sets before the capture is known.
 inline constexpr char kPaperBase[] = "custom";
+inline constexpr char kPaperConfig[] = "paper-config";  // the option
 
 // Sets everything that a configuration decides: field, box, effects and size of the photos.
 // Throws Error(kUsage) for a name that is not in kPaperConfigs.

@@ -4,13 +4,13 @@
 #include <string>
 
 #include "kernels/base/options.h"
+#include "pipeline/run/film_parts.h"
 
 namespace regrade {
 
 struct RefineOptions {
   int blocks = 8;
   std::string part;
-  bool join = false;
 
   template <typename Bind>
   void Describe(Bind& bind) {
@@ -22,14 +22,13 @@ struct RefineOptions {
           .once = true});
     bind("part", part,
          {.help = "K/N makes each N-th block from the K-th on, in their turns, to blocks/ of "
-                  "the folder, and "
-                  "nothing else; parts may be made at the same time, on any machines that "
-                  "share the folder",
-          .once = true});
-    bind("join", join,
-         {.help = "makes the field of blocks that are there, and names those that are missing",
+                  "the folder, and nothing else; parts may be made at the same time, on any "
+                  "machines that share the folder. join makes the field of blocks that are "
+                  "there, and names those that are missing",
           .once = true});
   }
+  bool Join() const { return part == kJoinParts; }
+  bool One() const { return !part.empty() && !Join(); }
 };
 
 }  // namespace regrade

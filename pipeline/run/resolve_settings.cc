@@ -36,7 +36,7 @@ JsonValue PresetValues(const std::string& preset, bool on_card) {
       const JsonValue* const set = other.Find(key);
       return set != nullptr && !(*set == plain.At(key));
     };
-    if (network.Find(name) != nullptr || name == "paper-config" ||
+    if (network.Find(name) != nullptr || name == kPaperConfig ||
         std::ranges::any_of(presets, differs))
       set[name] = value;
   }
@@ -174,12 +174,14 @@ std::vector<std::string> ResolveSettings(const SettingsSources& sources, OptionS
   }
   if (const auto preset = options->Given("preset"))
     ApplyKnown(PresetValues(*preset, on_card), OptionSet::kPresetOf + *preset, options);
-  if (const auto config = options->Given("paper-config"); config && config != "auto") {
+  if (const JsonValue* const paper =
+          given.is_run ? nullptr : given.run.options.Find(kPaperConfig);
+      paper != nullptr && paper->IsString() && paper->AsString() != "auto") {
     const JsonValue values = options->Values();
     if (const JsonValue* preset = values.Find("preset");
         options->Given("preset").value_or(preset != nullptr ? preset->AsString() : "") ==
         "paper")
-      ApplyKnown(PaperValues(*config), "--paper-config", options);
+      ApplyKnown(PaperValues(paper->AsString()), kPaperConfig, options);
   }
   if (const auto recipe = options->Given("recipe"))
     ApplyKnown(RecipeValues(*recipe), "--recipe", options);

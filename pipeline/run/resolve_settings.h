@@ -28,7 +28,7 @@ struct SettingsSources {
 //   1. the preset: that of the run.json, or else of `sources`
 //   2. `sources.run_json`, without options of one start, then the file of --config
 //   3. --preset, for the options that presets set
-//   4. --paper-config, with the preset paper, for what it decides
+//   4. paper-config, with the preset paper, for what it decides
 //   5. --recipe, for all options of the style network
 //   6. single flags
 //   7. "reproducible" with the device "cuda": exact sums of the fit and the style

@@ -26,11 +26,14 @@ void CheckSchema(const JsonValue& run) {
 
 // Options of earlier versions, which every run.json of theirs names; and what a rate or weight
 // of theirs could be instead of a number.
-constexpr std::array kEarlierOptions = {
-    "exact",          "fit-cell-pixels", "fit-fewer-stages",      "fit-field",
-    "fit-free-space", "fit-max-cells",   "fit-max-forward-cells", "fit-outward",
-    "keep-field",     "style-embedding", "style-features",        "style-iterations",
-    "style-regrain"};
+constexpr std::array kEarlierOptions = {"control-field",   "exact",
+                                        "fit-cell-pixels", "fit-fewer-stages",
+                                        "fit-field",       "fit-free-space",
+                                        "fit-max-cells",   "fit-max-forward-cells",
+                                        "fit-outward",     "keep-field",
+                                        "match-network",   "style-embedding",
+                                        "style-features",  "style-iterations",
+                                        "style-regrain"};
 constexpr std::array kEarlierAuto = {"fit-rate-density", "fit-rate-density-end", "tv-density",
                                      "tv-sh"};
 
@@ -50,8 +53,9 @@ JsonValue OptionsOf(const JsonValue& options) {
       continue;
     const bool is_auto = value.IsString() && value.AsString() == "auto" &&
                          std::ranges::find(kEarlierAuto, name) != kEarlierAuto.end();
-    if (!is_auto && std::ranges::find(kEarlierOptions, name) == kEarlierOptions.end())
-      kept[name] = value;
+    if (is_auto || std::ranges::find(kEarlierOptions, name) != kEarlierOptions.end()) continue;
+    const bool was_switch = name == "controls" && value.IsBool();
+    kept[name] = was_switch ? JsonValue(value.AsBool() ? "on" : "off") : value;
   }
   return kept;
 }

@@ -60,12 +60,10 @@ void CheckResidual(const RunSettings& settings, StyleMethodKind method) {
 
 void CheckMatch(const RunSettings& settings) {
   const StyleSource& style = settings.style;
-  if (!style.match.On()) {
-    if (!style.match.network.empty())
-      throw UsageError("a network that nothing is matched with", "--match-network",
-                       "give --match regions, too");
-    return;
-  }
+  if (!style.match.IsKnown())
+    throw UsageError("'" + style.match.match + "' is not allowed", "--match",
+                     "use none, regions or regions:FILE.onnx");
+  if (!style.match.On()) return;
   if (style.pictures.size() < 2)
     throw UsageError("matching needs several pictures", "--match regions",
                      "give --style once for each, or leave --match out");

@@ -46,6 +46,11 @@ struct SceneOptions {
   const FieldKind& Kind() const { return KindNamed(field); }
 };
 
+inline constexpr char kUps[] = "auto|x|-x|y|-y|z|-z",
+                      kUpHelp[] =
+                          "of a file of splats without --cameras: the direction that is up in "
+                          "it; auto decides by the file's surfaces";
+
 // What the program needs to know of a file of splats that is given in place of photos.
 struct SplatInput {
   std::string cameras, up = "auto";
@@ -56,10 +61,7 @@ struct SplatInput {
          {.help = "of a file of splats: a capture whose cameras are in its world: photos with "
                   "poses, a COLMAP model, a folder of regrade, or a cameras.json. Without it "
                   "views are placed by measurement"});
-    bind("up", up,
-         {.help = "of a file of splats without --cameras: the direction that is up in it; auto "
-                  "decides by the file's surfaces",
-          .choices = "auto|x|-x|y|-y|z|-z"});
+    bind("up", up, {.help = kUpHelp, .choices = kUps});
   }
 };
 
@@ -132,8 +134,8 @@ struct RenderOptions {
     bind("vignette", vignette,
          {.help =
               "A,B multiplies the style's films and stills by 1 + A r^2 + B r^4, r from 0 at "
-              "the middle to 1 at the corners, as `regrade retouch --keep-vignette` sets it; "
-              "none. What is measured, mixtures and pages have none"});
+              "the middle to 1 at the corners; none; edit, of `regrade retouch`, takes that of "
+              "the edit. What is measured, mixtures and pages have none"});
     path.Describe(bind);
   }
 };

@@ -136,7 +136,7 @@ void AddFilm(RunContext* context, const FidelityTargets& networks, const Camera&
         WhereEdited(targets.views_2d, FramesOf(kept, folder(kEditedFrames), all));
   targets.transmittance = FramesOf(kept, folder("transmittance"), all);
   targets.unstyled = sequences[0].frames;
-  if (options.controls)
+  if (options.HasControls())
     Append(ControlSequences({sequences[0].frames, sequences.back().frames, targets.views_2d,
                              targets.style, !settings.object.On()},
                             kPathPrefix),
@@ -159,7 +159,7 @@ void AddFilm(RunContext* context, const FidelityTargets& networks, const Camera&
 std::vector<MissingControl> MissingControls(const RunSettings& settings, bool map_has_target,
                                             bool same_camera) {
   std::vector<MissingControl> missing;
-  if (!settings.consistency.controls) return missing;
+  if (!settings.consistency.HasControls()) return missing;
   if (settings.object.On())
     missing.push_back({kLinearMapControl, "only a part of the scene is styled"});
   else if (!map_has_target)
@@ -193,8 +193,8 @@ StageOutcome Evaluate(RunContext* context, const ProgressFunction& progress) {
   double weight = PairWeight(settings, static_cast<int>(all.size())) +
                   n * (4 * kFrameSeconds + kLinearMapSeconds);
   if (film > 0) weight += PairWeight(settings, film) + 3 * kFrameSeconds * film;
-  if (settings.consistency.control_field) weight += kControlFieldSeconds;
-  if (settings.consistency.controls) weight += kCeilingSeconds;
+  if (settings.consistency.HasControlField()) weight += kControlFieldSeconds;
+  if (settings.consistency.HasControls()) weight += kCeilingSeconds;
   ProgressParts parts(progress, weight);
 
   // A method that styles photos only has no pictures of rendered frames.
@@ -233,11 +233,11 @@ StageOutcome Evaluate(RunContext* context, const ProgressFunction& progress) {
         return none;
       }};
   const FrameSource all_2d = renders_styled ? sequences[1].frames : FrameSource();
-  if (settings.consistency.controls)
+  if (settings.consistency.HasControls())
     Append(controls.Of(all, sequences[0].frames, all_2d, sequences.back().frames, same_camera),
            &sequences);
   std::optional<StoredField> field_2d;
-  if (settings.consistency.control_field) {
+  if (settings.consistency.HasControlField()) {
     field_2d = ControlField(context, views, stored, training_views, photo_2d,
                             parts.Next(kControlFieldSeconds));
     sequences.push_back(ControlFieldFrames(*field_2d, compared, gains));
@@ -260,7 +260,7 @@ StageOutcome Evaluate(RunContext* context, const ProgressFunction& progress) {
   std::vector<Camera> training_cameras;
   for (const int i : training_views) training_cameras.push_back(cameras[i]);
   std::optional<StoredField> ceiling;
-  if (settings.consistency.controls) {
+  if (settings.consistency.HasControls()) {
     ceiling = CeilingField(ReadStyledField(context->workspace->folder(), workspace.folder()),
                            training_cameras, UndoGains(targets.views_2d, training_gains),
                            settings.run.seed, parts.Next(kCeilingSeconds));
@@ -279,7 +279,7 @@ StageOutcome Evaluate(RunContext* context, const ProgressFunction& progress) {
   for (const char* name : {"source", "views_2d", "styled"})
     if (renders_styled || name != std::string("views_2d"))
       measured.push_back({name, frames(name, training_views)});
-  if (settings.consistency.controls)
+  if (settings.consistency.HasControls())
     Append(controls.Of(training_views, targets.unstyled, targets.views_2d,
                        measured.back().frames, true),
            &measured);

@@ -52,7 +52,7 @@ std::unique_ptr<ViewStylizer> MakeMatchedStylizer(const StyleSource& style, size
   std::vector<Image> examples;
   for (const std::string& path : style.pictures)
     examples.push_back(StyleExample(path, nullptr));
-  const auto features = std::make_shared<const RegionFeatures>(style.match.network, examples);
+  const auto features = std::make_shared<const RegionFeatures>(style.match.Network(), examples);
   std::vector<PictureFeatures> of_styles, of_photos;
   for (const Image& example : examples) of_styles.push_back(features->Of(example));
   for (size_t i = 0; i < views; ++i)

@@ -11,7 +11,7 @@ namespace regrade {
 // A network, or folder of networks, of `--method onnx:PATH`. Throws Error(kExternalProgram)
 // naming the file.
 void ProbeStyleNetwork(const std::string& path);
-// The network of --match-network, likewise.
+// The network of --match regions:FILE, likewise.
 void ProbeFeatureNetwork(const std::string& path);
 
 // The network of --depth-network, likewise.

@@ -125,7 +125,7 @@ StageOutcome Render(const JsonValue& inputs, RunContext* context,
   outcome.outputs = {"frames"};
   SayPlan(plan, settings.render, console);
   JoinedParts rendered;
-  if (context->parts.join) {
+  if (context->parts.Join()) {
     RemoveFrames(plan, style);
     rendered = JoinParts(inputs, plan, context, &seen);
   } else {

@@ -40,9 +40,10 @@ Image StyleExampleOf(const StyleSource& style, std::string* notice) {
 
 JsonValue StyleFiles(const StyleSource& style) {
   if (!style.match.On()) return HashFile(style.picture());
-  JsonValue files = JsonValue::Object{{"pictures", PicturesHash(style.pictures)},
-                                      {"match", style.match.match}};
-  if (!style.match.network.empty()) files["network"] = HashFile(style.match.network);
+  JsonValue files =
+      JsonValue::Object{{"pictures", PicturesHash(style.pictures)}, {"match", "regions"}};
+  if (const std::string network = style.match.Network(); !network.empty())
+    files["network"] = HashFile(network);
   return files;
 }
 

@@ -21,6 +21,8 @@ namespace fs = std::filesystem;
 
 constexpr uint64_t kMostBytes = 200'000'000;
 constexpr char kFilmOfRun[] = "styled.mp4";
+constexpr int kChecks = 2;           // films that say they should be chosen
+constexpr double kLeastSeconds = 3;  // a film is seen before it can be chosen
 
 // "video/mp4" by the first bytes; empty for other files.
 std::string TypeOf(const std::string& bytes) {
@@ -59,14 +61,13 @@ std::string NameOf(const std::string& method) {
 std::vector<std::string> NamesOf(const std::vector<std::string>& methods,
                                  const std::vector<std::string>& given) {
   if (!given.empty() && given.size() != methods.size())
-    throw UsageError(Concat(methods.size(), " methods, ", given.size(), " names"),
-                     "--method-name", "give the option once for each method, or not at all");
+    throw UsageError(Concat(methods.size(), " methods, ", given.size(), " names"), "--name",
+                     "give the option once for each method, or not at all");
   std::vector<std::string> names = given;
   if (names.empty())
     for (const std::string& method : methods) names.push_back(NameOf(method));
   if (std::set<std::string>(names.begin(), names.end()).size() != names.size())
-    throw UsageError("two methods have one name: " + names[0], "--method-name",
-                     "name each method");
+    throw UsageError("two methods have one name: " + names[0], "--name", "name each method");
   return names;
 }
 
@@ -96,7 +97,6 @@ MadeStudy MakeStudy(const std::vector<std::string>& methods, const StudyOptions&
   hasher.Add(options.protocol);
   hasher.Add(options.question);
   for (const std::string& name : study.methods) hasher.Add(name + "\n");
-  hasher.Add(Concat(options.checks));
   uint64_t bytes_left = kMostBytes;
   JsonValue::Array clips;
   for (const auto& [clip, path] : films[0]) {
@@ -126,8 +126,8 @@ MadeStudy MakeStudy(const std::vector<std::string>& methods, const StudyOptions&
       {"protocol", options.protocol},
       {"question", options.question},
       {"methods", JsonValue::Array(study.methods.begin(), study.methods.end())},
-      {"checks", options.checks},
-      {"seconds", options.seconds},
+      {"checks", kChecks},
+      {"seconds", kLeastSeconds},
       {"clips", std::move(clips)}};
   std::string json;
   for (const char c : DumpJson(data, -1)) json += c == '<' ? "\\u003c" : std::string(1, c);

@@ -13,8 +13,6 @@ struct StudyOptions {
   std::string protocol = "pairs";
   std::string question = "Which film do you prefer?";
   std::vector<std::string> names;
-  int checks = 2;
-  double seconds = 3;
 
   template <typename Bind>
   void Describe(Bind& bind) {
@@ -24,18 +22,9 @@ struct StudyOptions {
                  "and asks for the favourite, as LipRF's study of 16 clips and 35 volunteers",
          .choices = kStudyProtocols});
     bind("question", question, {.help = "what each choice answers"});
-    bind("method-name", names,
+    bind("name", names,
          {.help = "name of a method in the answers, once for each in their order; by default "
                   "the name of its file or folder"});
-    bind("checks", checks,
-         {.help = "attention checks: a film that says it should be chosen",
-          .min = 0,
-          .max = 20});
-    bind("least-seconds", seconds,
-         {.unit = "s",
-          .help = "films are seen that long before they can be chosen",
-          .min = 0,
-          .max = 60});
   }
 };
 

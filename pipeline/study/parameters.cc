@@ -102,7 +102,7 @@ JsonValue PresetOptions(const std::string& preset) {
 std::vector<Variant> VariantsOf(const RunSettings& base, const ParameterChoice& choice) {
   VariantList list(choice);
   const int size = base.pose.image_size;
-  if (choice.poses)
+  if (choice.photos && !choice.only.empty())
     list.AddBenchmark(
         "poses", {{"poses", "pose-image-size", size, {size * 6 / 10, size, size * 16 / 10}}});
   const std::vector<MeasuredOption> of_field = FitKindOf(base).measured(base);

@@ -37,8 +37,8 @@ struct Variant {
 };
 
 struct ParameterChoice {
-  std::vector<std::string> only;  // these parameters; empty: all
-  bool poses = false, style = false;
+  std::vector<std::string> only;       // these parameters; empty: all
+  bool photos = false, style = false;  // photos: without poses
   std::vector<std::string> presets;
 };
 

@@ -90,7 +90,6 @@ std::string OwnTemporary(const std::string& path) {
 
 FolderLock::FolderLock(const std::string& path, LockUse use) {
   const int kind = use == LockUse::kShared ? LOCK_SH : LOCK_EX;
-  bool break_lock = use == LockUse::kBreak;
   const std::string folder = std::filesystem::path(path).parent_path().parent_path().string();
   while (true) {
     fd_.Reset(OpenOwnFile(path, O_RDWR | O_CREAT));
@@ -111,16 +110,13 @@ FolderLock::FolderLock(const std::string& path, LockUse use) {
         throw ResourceError(
             std::string("this file system cannot lock files: ") + std::strerror(error), path,
             "choose a folder on a local disk with --out");
-      const bool may_break = break_lock && !holder.AliveHere();
-      if (!may_break)
-        throw Error(ExitCode::kFolderInUse, "in use by " + holder.Text(), folder,
-                    break_lock ? "it is still running: end it first"
-                               : "wait for it or end it; if that run has certainly ended (a "
-                                 "network drive can keep its lock), add --break-lock");
-      if (::unlink(path.c_str()) != 0 && errno != ENOENT)
-        throw ResourceError(std::string("cannot remove the lock: ") + std::strerror(errno),
-                            path);
-      break_lock = false;
+      throw Error(ExitCode::kFolderInUse, "in use by " + holder.Text(), folder,
+                  "wait for it or end it" +
+                      (holder.AliveHere()
+                           ? ""
+                           : "; if that run has certainly ended (a network drive can keep its "
+                             "lock), remove " +
+                                 path));
     }
   }
   const std::string text = HolderText();

@@ -13,8 +13,6 @@ std::string OwnTemporary(const std::string& path);
 enum class LockUse {
   kAlone,   // nobody else holds it
   kShared,  // others may share it, and nobody holds it alone
-  kBreak,   // alone; replaces the file of a lock that was not released (by a network drive),
-            // which is refused while the holder is alive on this machine
 };
 
 // Holds flock on `path`, a file that is created and stays; its text names pid, host and start

@@ -97,12 +97,12 @@ void Workspace::CheckResults(const std::string& folder,
   }
 }
 
-Workspace::Workspace(const std::string& folder, bool break_lock) : folder_(CleanPath(folder)) {
+Workspace::Workspace(const std::string& folder) : folder_(CleanPath(folder)) {
   MakeFolder(folder_);
   RefuseForeignFolder(folder_);
   RefuseLinks(folder_);
   MakeFolder(folder_ + kOwnFolder);
-  lock_.emplace(folder_ + kOwnFolder + "/lock", break_lock ? LockUse::kBreak : LockUse::kAlone);
+  lock_.emplace(folder_ + kOwnFolder + "/lock", LockUse::kAlone);
   MakeFolder(Path(".regrade/stages"));
   MakeFolder(Path(".regrade/checkpoints"));
   RefuseOlderRecords();

@@ -38,7 +38,7 @@ class Workspace {
   // Throws before any work: Error(kResources) if it cannot be written or is not a folder,
   // Error(kFolderInUse), Error(kInput) if it holds files under our names that we did not write,
   // links among its files (RefuseLinks), or stage records of an older schema.
-  explicit Workspace(const std::string& folder, bool break_lock = false);
+  explicit Workspace(const std::string& folder);
   // For a process that works in a folder of its own below it, beside others like it: no run can
   // have the lock meanwhile, and nothing is removed. Throws the same, and Error(kInput) where
   // no run has worked.

@@ -12,7 +12,7 @@ namespace {
 
 constexpr const char* kInstall =
     "install COLMAP 3.7 or newer (Debian, Ubuntu: apt install colmap), or give its path with "
-    "--colmap PATH, or start from a capture that has poses";
+    "--config '{\"colmap\":\"PATH\"}', or start from a capture that has poses";
 
 // Options renamed by COLMAP 3.12: {in 3.8, since 3.12}.
 constexpr std::pair<const char*, const char*> kRenamed[] = {
@@ -91,9 +91,8 @@ ColmapProgram::ColmapProgram(const std::string& program, const std::string& log_
     throw ProgramError("COLMAP " + version_ + " is too old (3.7 and newer are supported)",
                        program, kInstall);
   if (gpu == "on" && !has_cuda)
-    throw ProgramError(
-        "this COLMAP was built without CUDA", program,
-        "leave colmap-gpu at auto, or give a COLMAP with CUDA with --colmap PATH");
+    throw ProgramError("this COLMAP was built without CUDA", program,
+                       "leave colmap-gpu at auto, or put a COLMAP with CUDA first on PATH");
   use_gpu_ = gpu != "off" && has_cuda;
   may_fall_back_ = gpu == "auto";
 }

@@ -27,7 +27,8 @@ struct PoseOptions {
 
   template <typename Bind>
   void Describe(Bind& bind) {
-    bind("colmap", colmap, {.help = "the COLMAP program: a name on PATH, or a path"});
+    bind("colmap", colmap,
+         {.help = "the COLMAP program: a name on PATH, or a path", .constant = true});
     bind("colmap-gpu", colmap_gpu,
          {.help = "auto finds and matches features on a GPU where this COLMAP was built with "
                   "CUDA, and goes on with the CPU if that fails",

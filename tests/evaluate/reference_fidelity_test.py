@@ -35,7 +35,7 @@ def main():
         measured = {}
         for edges, key in (("gradient", "edge_ssim"), (path("edges.onnx"), "edge_ssim_by_network")):
             run([regrade, "evaluate", "--frames", path("styled"), "--reference", path("source"), "--style", path("style.png"),
-                 "--target", path("source"), "--lpips", path("lpips.onnx"), "--edges", edges, "--gaps", "1",
+                 "--target", path("source"), "--lpips", path("lpips.onnx"), "--config", json.dumps({"edges": edges}), "--gaps", "1",
                  "--out", path("out")])
             with open(path("out/report.json"), encoding="utf-8") as file:
                 row = next(r for r in json.load(file)["fidelity"] if r["sequence"] == "styled")

@@ -143,7 +143,7 @@ TEST(EvaluateCommand, ControlsAreRows) {
     WriteText(folder / ("grey/0000" + std::to_string(i) + ".png"),
               EncodePng8(Image(64, 48, 1)));
   const auto evaluate = [&](std::vector<std::string> more) {
-    more.insert(more.end(), {"--frames", folder / "styled", "--gaps", "1", "--controls",
+    more.insert(more.end(), {"--frames", folder / "styled", "--gaps", "1", "--controls", "on",
                              "--out", folder / "out"});
     const ProgramOutcome done = Evaluate(more);
     EXPECT_EQ(done.code, 0) << done.text;
@@ -197,7 +197,8 @@ TEST(EvaluateCommand, AProtocolSetsModeAndGaps) {
   const ProgramOutcome refused = evaluate({"--protocol", "liprf", "--gaps", "1,7"}, "refused");
   EXPECT_EQ(refused.code, 2);
   EXPECT_SAYS(refused, "leave out --gaps");
-  const ProgramOutcome fitted = evaluate({"--control-field"}, "refused");  // of what photos?
+  const ProgramOutcome fitted =
+      evaluate({"--controls", "field"}, "refused");  // of what photos?
   EXPECT_EQ(fitted.code, 2);
   EXPECT_SAYS(fitted, "for runs of regrade only");
   EXPECT_FALSE(std::filesystem::exists(folder / "refused"));

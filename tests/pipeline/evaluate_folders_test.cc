@@ -83,7 +83,7 @@ TEST(EvaluateFolders, SeveralFoldersAreComparedPairByPair) {
                                      folder / "source", "--gaps", "1", "--out", folder / "out"},
                                     more));
   };
-  const ProgramOutcome outcome = evaluate({"--label", "Ours", "Other & co", "--table", "latex",
+  const ProgramOutcome outcome = evaluate({"--name", "Ours", "Other & co", "--format", "latex",
                                            "--require", "styled-2:tc-psnr:1<=90"});
   ASSERT_EQ(outcome.code, 0) << outcome.text;
   EXPECT_SAYS(outcome, "minus Ours & 95 \\%");
@@ -101,9 +101,9 @@ TEST(EvaluateFolders, SeveralFoldersAreComparedPairByPair) {
   EXPECT_LE(other.At("tc_psnr_difference_low_db").AsDouble(), difference);
   EXPECT_GE(other.At("tc_psnr_difference_high_db").AsDouble(), difference);
   for (const auto& [more, part] : std::vector<std::pair<std::vector<std::string>, std::string>>{
-           {{"--label", "one"}, "1 labels for 2 folders"},
-           {{"--label", "one", "one"}, "the same label"},
-           {{"--label"}, "its value is missing"},
+           {{"--name", "one"}, "1 names for 2 folders"},
+           {{"--name", "one", "one"}, "the same name"},
+           {{"--name"}, "its value is missing"},
            {{"--require", "styled-3:tc-psnr:1>=1"}, "styled_3"},
            {{"--junit", folder / "j.xml"}, "add --require"}}) {
     const ProgramOutcome refused = evaluate(more);
@@ -145,7 +145,7 @@ TEST(EvaluateFolders, MotionFromCamerasAndDepth) {
                                     more));
   };
   const ProgramOutcome exact =
-      evaluate({"--protocol", "geometry", "--poses", folder / "s/truth/transforms.json",
+      evaluate({"--protocol", "geometry", "--cameras", folder / "s/truth/transforms.json",
                 "--depth", folder / "s/truth/depth"},
                "exact");
   ASSERT_EQ(exact.code, 0) << exact.text;
@@ -166,8 +166,8 @@ TEST(EvaluateFolders, MotionFromCamerasAndDepth) {
   }
   std::filesystem::remove(folder / "s/truth/depth/00003.npy");
   const ProgramOutcome missing =
-      evaluate({"--mode", "geometry", "--poses", folder / "s/truth/transforms.json", "--depth",
-                folder / "s/truth/depth"},
+      evaluate({"--mode", "geometry", "--cameras", folder / "s/truth/transforms.json",
+                "--depth", folder / "s/truth/depth"},
                "missing");
   EXPECT_EQ(missing.code, 3) << missing.text;
   EXPECT_SAYS(missing, "00003.png");
@@ -178,7 +178,7 @@ TEST(EvaluateFolders, MotionFromCamerasAndDepth) {
 TEST(EvaluateFolders, AMissingControlSaysWhy) {
   const TemporaryFolder folder;
   WriteFrames(folder / "styled", 3, 0.03f);
-  ASSERT_EQ(Evaluate({"--frames", folder / "styled", "--gaps", "1", "--controls", "--out",
+  ASSERT_EQ(Evaluate({"--frames", folder / "styled", "--gaps", "1", "--controls", "on", "--out",
                       folder / "out"})
                 .code,
             0);

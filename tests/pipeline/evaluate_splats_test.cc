@@ -146,7 +146,7 @@ TEST_F(EvaluateSplatFiles, MotionIsThatOfTheReferencesDepth) {
   // What is kept is enough for the same numbers, and for frames of other methods.
   const std::string kept = folder_ / "out/rendered/";
   const ProgramOutcome again =
-      Evaluate({"--frames", kept + "styled", "--reference", kept + "source", "--poses",
+      Evaluate({"--frames", kept + "styled", "--reference", kept + "source", "--cameras",
                 kept + "transforms.json", "--depth", kept + "depth", "--protocol", "geometry",
                 "--out", folder_ / "again"});
   ASSERT_EQ(again.code, 0) << again.text;
@@ -182,7 +182,7 @@ TEST_F(EvaluateSplatFiles, TheBackgroundIsChosen) {
 TEST_F(EvaluateSplatFiles, SeveralFilesAreComparedWithTheFirst) {
   const ProgramOutcome outcome =
       Score({"strong.ply", "weak.ply", "strong.ply"},
-            {"--label", "Ours", "Other", "Copy", "--gaps", "1", "--out", folder_ / "out"});
+            {"--name", "Ours", "Other", "Copy", "--gaps", "1", "--out", folder_ / "out"});
   ASSERT_EQ(outcome.code, 0) << outcome.text;
   EXPECT_SAYS(outcome, "minus Ours");
   const JsonValue report = ReportOf("out");
@@ -279,8 +279,9 @@ TEST_F(EvaluateSplatFiles, WhatIsNoSceneIsRefused) {
            {{"--splats", weak, "--reference", plain, "--depth", folder_ / "frames"},
             2,
             "--depth"},
-           {{"--splats", weak, "--reference", plain, "--label", "a", "b"}, 2, "2 labels for 1"},
-           {{"--frames", folder_ / "frames", "--cameras", "c.json"}, 2, "belongs to --splats"},
+           {{"--splats", weak, "--reference", plain, "--name", "a", "b"}, 2, "2 names for 1"},
+           {{"--frames", folder_ / "frames", "--cameras", "c.json"}, 2, "--protocol geometry"},
+           {{"--frames", folder_ / "frames", "--size", "99"}, 2, "belongs to --splats"},
            {{"--splats", folder_ / "frames", "--reference", plain}, 3, "is a folder"},
            {{"--splats", weak, "--reference", folder_ / "frames"}, 3, "is a folder"},
            {{"--splats", weak, "--reference", folder_ / "empty.ply"}, 3, "empty.ply"},

@@ -59,7 +59,7 @@ TEST(ForeignFolder, WhatItNamesOutsideIsAskedFor) {
                                                     {"flow", "onnx:/x.onnx"},
                                                     {"lpips", "/x.onnx"},
                                                     {"edges", "/x.onnx"},
-                                                    {"match-network", "/x.onnx"},
+                                                    {"match", "regions:/x.onnx"},
                                                     {"masks", "/elsewhere"},
                                                     {"style-mask", folder / "e/mask.png"},
                                                     {"residual", "layers:" + (folder / "x")},
@@ -90,13 +90,13 @@ TEST(ForeignFolder, ItsRunCannotSayYes) {
   WriteRun(folder / "e/run.json", JsonValue::Object{{"method", "mkl"},
                                                     {"edges", "gradient"},
                                                     {"yes", true},
-                                                    {"break-lock", true},
+                                                    {"junit", "/x.xml"},
                                                     {"restart-from", "pose"}});
   const Resolved resolved = Continue(folder, {}, false);
   EXPECT_TRUE(resolved.asked.empty());
   EXPECT_EQ(resolved.settings.consistency.edges, "gradient");
   EXPECT_FALSE(resolved.settings.start.yes);
-  EXPECT_FALSE(resolved.settings.start.break_lock);
+  EXPECT_EQ(resolved.settings.start.junit, "");
   EXPECT_EQ(resolved.settings.start.restart_from, "");
 }
 

@@ -52,7 +52,8 @@ TEST(Parts, OfARetouchedSceneAreTheSameBytes) {
   // Each unit from what it sees of the field.
   testing::Said(
       {"render", folder / "e", "--name", "half", "--part", "2/2", "--max-memory", "0.01"});
-  testing::Said({"render", folder / "e", "--name", "half", "--join", "--until", "render"});
+  testing::Said(
+      {"render", folder / "e", "--name", "half", "--part", "join", "--until", "render"});
   EXPECT_EQ(testing::ResultsOf(style), whole);
 }
 

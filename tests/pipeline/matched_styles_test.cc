@@ -113,7 +113,8 @@ TEST(MatchedStyles, EachRegionTakesItsPictureAndTheStyleIsLikeAnyOther) {
   EXPECT_EQ(refused({"--style", sky, "--style", wall, "--match", "regions", "--masks",
                      folder / "s/images"}),
             2);
-  EXPECT_EQ(refused({"--style", sky, "--match-network", sky}), 2);
+  EXPECT_EQ(refused({"--style", sky, "--style", wall, "--match", "colors"}), 2);
+  EXPECT_EQ(refused({"--style", sky, "--style", wall, "--match", "regions:"}), 2);
 }
 
 TEST(StyleFolders, PicturesOfOneStyleAreNamedTogether) {

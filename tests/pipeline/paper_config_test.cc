@@ -1,4 +1,4 @@
-// --paper-config: the resolved settings of each configuration against a table of svox2's, and
+// paper-config: the resolved settings of each configuration against a table of svox2's, and
 // what is refused.
 #include "pipeline/run/paper_config.h"
 
@@ -126,10 +126,14 @@ void ExpectPrinted(double value, double printed, const char* what) {
   EXPECT_NEAR(value, printed, 5e-3 * printed) << what;
 }
 
+std::vector<std::string> Paper(const std::string& config) {
+  return {"--preset", "paper", "--config", R"({"paper-config": ")" + config + R"("})"};
+}
+
 TEST(PaperConfig, ResolvedSettingsAreThePublishedOnes) {
   for (const Published& p : kPublished) {
     SCOPED_TRACE(p.name);
-    const RunSettings settings = Of({"--preset", "paper", "--paper-config", p.name});
+    const RunSettings settings = Of(Paper(p.name));
     const FitOptions& fit = settings.fit;
     EXPECT_EQ(fit.resolutions, p.x);
     EXPECT_EQ(fit.resolutions_y, p.y);
@@ -249,9 +253,9 @@ TEST(PaperConfig, ContradictionsAreRefused) {
   EXPECT_REGRADE_ERROR(ChoosePaperConfig("syn", {}), ExitCode::kUsage, "auto");
   EXPECT_REGRADE_ERROR(ChoosePaperConfig("llff", {.transparent = true}), ExitCode::kUsage,
                        "custom");
-  EXPECT_REGRADE_ERROR(Of({"--paper-config", "llff"}), ExitCode::kUsage, "--preset paper");
-  EXPECT_REGRADE_ERROR(Of({"--preset", "paper", "--paper-config", "co3d"}), ExitCode::kUsage,
-                       "llff");
+  EXPECT_REGRADE_ERROR(Of({"--config", R"({"paper-config": "llff"})"}), ExitCode::kUsage,
+                       "--preset paper");
+  EXPECT_REGRADE_ERROR(Of(Paper("co3d")), ExitCode::kUsage, "llff");
   EXPECT_REGRADE_ERROR(
       Of({"--field", "voxels", "--config", R"({"fit-resolutions-y": [64, 64, 64, 64, 64]})"}),
       ExitCode::kUsage, "5 sides for 3 stages");

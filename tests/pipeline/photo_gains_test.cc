@@ -233,7 +233,7 @@ TEST(KeepExposure, WhatFramesAreComparedWithHasTheirExposures) {
        "--preset",   "draft",
        "--effects",  "exposure=on,view-dependence=off",
        "--device",   "cpu",
-       "--controls", "--control-field",
+       "--controls", "field",
        "--gaps",     "1",
        "--strength", "0.1",
        "--page",     "off"},

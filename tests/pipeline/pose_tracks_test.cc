@@ -44,8 +44,9 @@ TEST(PoseTracks, WithoutColmapResultsAreThoseWithoutTracks) {
   const TemporaryFolder folder;
   Synth(folder / "s", "");
   Said({"pose", folder / "s/truth", "--out", folder / "given", "--tracks", "given"});
-  const std::string output = Said({"pose", folder / "s/truth", "--out", folder / "none",
-                                   "--colmap", folder / "no-such-colmap"});
+  const std::string output =
+      Said({"pose", folder / "s/truth", "--out", folder / "none", "--config",
+            R"({"colmap": ")" + (folder / "no-such-colmap") + R"("})"});
   EXPECT_NE(output.find("COLMAP found no tracks"), std::string::npos) << output;
   for (const char* name : {"cameras.bin", "images.bin", "points3D.bin"})
     EXPECT_EQ(ReadText(folder / (std::string("given/poses/sparse/") + name)),

@@ -56,19 +56,19 @@ TEST(Program, HelpAndVersion) {
 TEST(Program, HelpShowsTheOptionsOfTheCommand) {
   const ProgramOutcome retouch = Regrade({"retouch", "--help"}),
                        pose = Regrade({"pose", "--help"});
-  for (const char* part : {"--photo ", "--edited", "--from", "--keep-vignette"})
+  for (const char* part : {"--photo ", "--edited", "--from", "--vignette"})
     EXPECT_SAYS(retouch, part);
   EXPECT_EQ(retouch.text.find("--masks"), std::string::npos);
   EXPECT_EQ(pose.text.find("--style"), std::string::npos);
   EXPECT_SAYS(Regrade({"evaluate", "--help"}), "--reference");
   EXPECT_SAYS(Regrade({"tradeoff", "--help"}), "--budget");
-  EXPECT_SAYS(Regrade({"render", "--help"}), "--still");
+  EXPECT_SAYS(Regrade({"render", "--help"}), "--photo");
   EXPECT_SAYS(Regrade({"contact-sheet", "--help"}), "--views");
 }
 
 // Both are written from the table of options.
 TEST(Program, ManPageAndCompletionHaveEveryCommandAndOption) {
-  const ProgramOutcome man = Regrade({"manual"}), bash = Regrade({"manual", "--bash"});
+  const ProgramOutcome man = Regrade({"manual"}), bash = Regrade({"manual", "bash"});
   EXPECT_EQ(man.code, 0);
   EXPECT_EQ(bash.code, 0);
   for (const char* part : {".TH REGRADE 1", "regrade contact", "photo\\-size", "film\\-seconds",

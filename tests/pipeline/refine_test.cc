@@ -64,12 +64,12 @@ TEST_F(Refine, PartsGiveTheBytesOfOneProcess) {
       ASSERT_EQ(some.code, 0) << some.text;
     }
   EXPECT_EQ(ReadText(folder_ / "p/field.npz"), coarse);
-  const ProgramOutcome joined = RefineWith({"--join"}, "p");
+  const ProgramOutcome joined = RefineWith({"--part", "join"}, "p");
   ASSERT_EQ(joined.code, 0) << joined.text;
   EXPECT_EQ(ReadText(folder_ / "p/field.npz"), ReadText(folder_ / "o/field.npz"));
   // Given again, it does nothing.
   const std::string refined = ReadText(folder_ / "p/field.npz");
-  for (const char* again : {"--join", "--verbose"})
+  for (const char* again : {"--part=join", "--verbose"})
     EXPECT_EQ(RefineWith({again}, "p").code, 0) << again;
   EXPECT_EQ(ReadText(folder_ / "p/field.npz"), refined);
   // The stage counts as done, with the field that is there now.
@@ -80,12 +80,12 @@ TEST_F(Refine, PartsGiveTheBytesOfOneProcess) {
 TEST_F(Refine, AJoinNamesWhatIsMissing) {
   ASSERT_EQ(RefineWith({"--part", "1/3"}).code, 0);
   const std::string coarse = ReadText(folder_ / "o/field.npz");
-  const ProgramOutcome joined = RefineWith({"--join"});
+  const ProgramOutcome joined = RefineWith({"--part", "join"});
   EXPECT_EQ(joined.code, static_cast<int>(ExitCode::kInput));
   EXPECT_SAYS(joined, "of 3 and");
   // Of other settings all are missing, and which differ is said.
   const ProgramOutcome other = Regrade({"refine", folder_ / "o", "--blocks", "3", "--splats",
-                                        "5", "--splat-steps", "90", "--join"});
+                                        "5", "--splat-steps", "90", "--part", "join"});
   EXPECT_EQ(other.code, static_cast<int>(ExitCode::kInput));
   EXPECT_SAYS(other, "was 4.0, now 5.0");
   EXPECT_EQ(ReadText(folder_ / "o/field.npz"), coarse);
@@ -99,14 +99,14 @@ TEST_F(Refine, AJoinThatWasInterruptedIsRepeated) {
     fs::copy_file(entry.path() / "00001.npz", folder_ / "o/field.npz");
   EXPECT_EQ(Regrade({"refine", folder_ / "o", "--blocks", "2", "--part", "1/2"}).code,
             static_cast<int>(ExitCode::kInput));
-  const ProgramOutcome joined = RefineWith({"--join"});
+  const ProgramOutcome joined = RefineWith({"--part", "join"});
   ASSERT_EQ(joined.code, 0) << joined.text;
   EXPECT_EQ(Refined().At("blocks").AsInt(), 3);
 }
 
 TEST_F(Refine, WhatCannotBeIsRefused) {
   EXPECT_EQ(RefineWith({"--part", "4/3"}).code, static_cast<int>(ExitCode::kUsage));
-  EXPECT_EQ(RefineWith({"--part", "1/3", "--join"}).code, static_cast<int>(ExitCode::kUsage));
+  EXPECT_EQ(RefineWith({"--part", "joined"}).code, static_cast<int>(ExitCode::kUsage));
   EXPECT_EQ(RefineWith({"--holdout", "0"}).code, static_cast<int>(ExitCode::kUsage));
   EXPECT_EQ(RefineWith({}, "nowhere").code, static_cast<int>(ExitCode::kInput));
   EXPECT_FALSE(fs::exists(folder_ / "nowhere"));

@@ -210,7 +210,7 @@ TEST(Retouch, H190_AKeptVignetteIsOnFilmsAndStillsAndNotInTheScene) {
   ASSERT_EQ(Regrade(reconstruct).code, 0);
   ProgramOutcome outcome = Regrade({"retouch", folder / "out", "--photo", "00002", "--edited",
                                     folder / "s/truth/graded/00002.png", "--name", "v",
-                                    "--keep-vignette", "--until", "render"});
+                                    "--vignette", "edit", "--until", "render"});
   ASSERT_EQ(outcome.code, 0) << outcome.text;
   EXPECT_SAYS(outcome, "films and stills have it");
   const std::string style = folder / "out/styles/v";
@@ -228,7 +228,7 @@ TEST(Retouch, H190_AKeptVignetteIsOnFilmsAndStillsAndNotInTheScene) {
   EXPECT_NEAR(middle, 1, 0.02);
   // Stills, with and without.
   const auto still = [&](const std::vector<std::string>& more) {
-    EXPECT_EQ(Regrade({"render", folder / "out", "--name", "v", "--still", "00002"}, more).code,
+    EXPECT_EQ(Regrade({"render", folder / "out", "--name", "v", "--photo", "00002"}, more).code,
               0);
     return ReadImage(style + "/stills/00002.png");
   };

@@ -164,7 +164,7 @@ TEST(RunReport, ShowsEveryPartOfTheRun) {
   // With the rows that bound the table: of the views also photos, of which the 2D method has no
   // picture of those held out, and all rows have fidelity.
   const testing::ProgramOutcome bounded =
-      Regrade({"evaluate", folder / "e", "--gaps", "1", "--controls", "--control-field"});
+      Regrade({"evaluate", folder / "e", "--protocol", "lai2018", "--controls", "field"});
   ASSERT_EQ(bounded.code, 0) << bounded.text;
   const JsonValue table = ReadJsonFile(folder / "e/styles/style_sunset/report.json");
   std::set<std::string> measured_rows;
@@ -192,7 +192,7 @@ TEST(RunReport, ShowsEveryPartOfTheRun) {
   EXPECT_GT(to_2d("control_ceiling"), to_2d("control_linear_map"));
   EXPECT_SAYS(bounded, "fitted to the 2D method's pictures");
   const testing::ProgramOutcome again_bounded =
-      Regrade({"evaluate", folder / "e", "--gaps", "2", "--control-field"});
+      Regrade({"evaluate", folder / "e", "--gaps", "2", "--controls", "field"});
   ASSERT_EQ(again_bounded.code, 0) << again_bounded.text;
   EXPECT_EQ(again_bounded.text.find("fitted to the 2D method's pictures"), std::string::npos);
 }

@@ -102,7 +102,7 @@ TEST(Styles, EachHasItsFolderAndNothingIsOverwritten) {
   for (const std::vector<std::string>& shown :
        {std::vector<std::string>{"contact-sheet", folder / "e", "begun", "--out", folder / "x"},
         {"mix", folder / "e", "begun", "--out", folder / "x"},
-        {"render", folder / "e", "--name", "begun", "--still", "00001"},
+        {"render", folder / "e", "--name", "begun", "--photo", "00001"},
         {"export", folder / "e", "--format", "cube", "--name", "begun", "--out", folder / "x"}})
     EXPECT_EQ(Regrade(shown).code, 3) << shown[0];
   testing::Said({"export", folder / "e", "--format", "ply", "--out", folder / "y"});
@@ -252,7 +252,7 @@ TEST(Styles, NothingOfThePhotosMetadataLeaves) {
   }
   testing::Said(RunOf(folder, "e", {"--style", Asset("sunset")}));
   for (const char* format : {"png", "jpeg", "tiff"})
-    testing::Said({"render", folder / "e", "--still", "00001", "--format", format});
+    testing::Said({"render", folder / "e", "--photo", "00001", "--format", format});
   int files = 0;
   for (const auto& entry : fs::recursive_directory_iterator(folder / "e/styles")) {
     if (!entry.is_regular_file()) continue;
@@ -269,7 +269,7 @@ TEST(Stills, HaveThePhotosSizeAndASrgbTag) {
   Synth(folder);
   testing::Said(RunOf(folder, "e", {"--style", Asset("sunset")}));
   for (const char* format : {"png", "jpeg", "tiff"})
-    testing::Said({"render", folder / "e", "--still", "00001", "--format", format});
+    testing::Said({"render", folder / "e", "--photo", "00001", "--format", format});
   const std::string stills = folder / "e/styles/style_sunset/stills/00001";
   const DecodedPhoto png = DecodePhoto(stills + ".png"), jpeg = DecodePhoto(stills + ".jpg"),
                      tiff = DecodePhoto(stills + ".tif");
@@ -284,9 +284,9 @@ TEST(Stills, HaveThePhotosSizeAndASrgbTag) {
   EXPECT_LT(worst, 0.5f / 255 + 1e-4f);  // rounding to 8 bits
   EXPECT_LT(worst_jpeg, 40.f / 255);     // of quality 95 with chroma at half size
   EXPECT_TRUE(png.notice.empty() && jpeg.notice.empty() && tiff.notice.empty());
-  ASSERT_EQ(Regrade({"render", folder / "e", "--still", "00002.png", "--size", "48"}).code, 0);
+  ASSERT_EQ(Regrade({"render", folder / "e", "--photo", "00002.png", "--size", "48"}).code, 0);
   EXPECT_EQ(ReadImage(folder / "e/styles/style_sunset/stills/00002.png").width, 48);
-  const ProgramOutcome none = Regrade({"render", folder / "e", "--still", "nowhere"});
+  const ProgramOutcome none = Regrade({"render", folder / "e", "--photo", "nowhere"});
   EXPECT_EQ(none.code, 3);
   EXPECT_SAYS(none, "00000");
 }

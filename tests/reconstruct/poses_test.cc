@@ -174,7 +174,7 @@ TEST_F(Poses, F46_MissingProgram) {
   options_.colmap = "no-such-colmap";
   EXPECT_REGRADE_ERROR(
       PosesFromPhotos(Photos(10), {}, options_, folder_ / "work", folder_ / "sparse"),
-      ExitCode::kExternalProgram, "no-such-colmap: ", "apt install colmap", "--colmap");
+      ExitCode::kExternalProgram, "no-such-colmap: ", "apt install colmap", "{\"colmap\":");
 }
 
 TEST_F(Poses, F47_Versions) {

@@ -32,7 +32,7 @@ styles:
   sunset: {root}/assets/style_sunset.png
 methods:
   MKL: --method mkl --mode geometry --style-steps 10
-first_seed: --control-field
+first_seed: --controls field
 results: {results}
 foreign: {{other: "{work}/runs/{{scene}}/{{style}}/MKL/0/styles/style/frames/views_2d"}}
 """

@@ -14,7 +14,7 @@ until it finishes. Its model must have every photo and lie within 0.5 degrees an
 --pose-kills needs colmap. A kill takes about 3 s on two cores.
 
 `regrade render` by parts, three at a time, is killed and begun again in the same way until each has finished; what
---join makes of them must be the baseline's, too. So are the blocks of `regrade refine`, two at a time, whose field must have
+--part join makes of them must be the baseline's, too. So are the blocks of `regrade refine`, two at a time, whose field must have
 the bytes of one that was refined without a kill.
 
   --control all   checks that this script finds errors: between two starts a checkpoint is exchanged for that of a run
@@ -191,7 +191,7 @@ class Supervisor:
         self.reset(self.posed)
         self.complete(self.command(more=("--until", "stylize")), ["pose"])
         self.kill_parts([self.regrade, "render", self.work], parts, 0.6 * self.duration["render"], "a part")
-        status, error = call([self.regrade, "render", self.work, "--join"])
+        status, error = call([self.regrade, "render", self.work, "--part", "join"])
         if status != 0:
             self.report(f"the parts were not joined: {error}")
         self.compare("a film of killed parts")
@@ -232,7 +232,7 @@ class Supervisor:
             self.duration["refine"] = time.monotonic() - begin
         for _ in range(5):  # turns of three blocks, with last ones
             self.kill_parts([self.regrade, "refine", self.work, *refine], 2, 0.5 * self.duration["refine"], "a block")
-        status, error = call([self.regrade, "refine", self.work, *refine, "--join"])
+        status, error = call([self.regrade, "refine", self.work, *refine, "--part", "join"])
         if status != 0:
             self.report(f"the blocks were not joined: {error}")
         self.compared += 1

@@ -104,9 +104,9 @@ def paper(regrade, work):
     expect(fit["sh_degree"] == 2, "the degree was tried")
     for config, word in (("syn", "transparent"), ("llff", "one way")):
         refused = subprocess.run([regrade, "run", os.path.join(work, "capture", "truth"), "--style", STYLE, "--out", out + config,
-                                  "--preset", "paper", "--paper-config", config], stdin=subprocess.DEVNULL, capture_output=True,
+                                  "--preset", "paper", "--config", json.dumps({"paper-config": config})], stdin=subprocess.DEVNULL, capture_output=True,
                                  text=True, check=False)
-        expect(refused.returncode == 2 and word in refused.stderr, f"--paper-config {config} is not refused: {refused.stderr}")
+        expect(refused.returncode == 2 and word in refused.stderr, f"paper-config {config} is not refused: {refused.stderr}")
 
 
 def main():
