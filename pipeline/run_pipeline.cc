@@ -56,7 +56,7 @@ constexpr StageEntry kStages[] = {
     // metrics, heatmaps/
     {"evaluate", EvaluateStage},
     // all records -> report.json, report.html (pipeline/report); the scene -> scene.html, a
-    // page to walk in (pipeline/page/make_page.h; splats in splat_codec.h, styles in
+    // page to walk in (pipeline/page/make_page.h; splats in field_codec.h, styles in
     // style_codec.h)
     {"report", ReportStage},
 };

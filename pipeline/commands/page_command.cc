@@ -50,13 +50,9 @@ void RunPage(const Command& command, const Arguments& arguments, Console* consol
   for (const std::string& line : made.report) console->Info(line);
   const double megabytes = static_cast<double>(made.html.size()) / 1e6;
   console->Info(Concat(
-      "wrote ", file.out, ": ", Format("%.1f", megabytes), " MB, ", made.records, " ",
-      made.records_name, " of ",
-      Format("%.2f", static_cast<double>(made.field_bytes) / static_cast<double>(made.records)),
+      "wrote ", file.out, ": ", Format("%.1f", megabytes), " MB, ", made.splats, " splats of ",
+      Format("%.2f", static_cast<double>(made.field_bytes) / static_cast<double>(made.splats)),
       " bytes, ", Counted(std::ssize(styles), "style")));
-  if (made.coarse_bytes > 0)
-    console->Info(Concat(
-        "  a coarse scene, which it shows first: ", (made.coarse_bytes + 999) / 1000, " kB"));
   for (size_t i = 0; i < styles.size(); ++i)
     console->Info(Concat("  ", styles[i], ": ", (made.style_bytes[i] + 999) / 1000, " kB"));
   console->Info(Concat(

@@ -18,7 +18,9 @@
 #include "kernels/base/error.h"
 #include "pipeline/commands/command.h"
 #include "pipeline/commands/page_styles.h"
+#include "pipeline/fields/field_file.h"
 #include "pipeline/files/atomic_file.h"
+#include "pipeline/page/make_page.h"
 #include "pipeline/page/view_session.h"
 #include "pipeline/program/interrupt.h"
 #include "pipeline/report/html_text.h"
@@ -99,6 +101,13 @@ bool MayWait(const std::string& folder, const Arguments& words) {
   return words.size() == 1 && Workspace::Exists(folder);
 }
 
+// Before the address is printed, where the scene is there. Throws Error(kInput).
+void RequireSplats(const std::string& folder) {
+  const std::string field = folder + "/field.npz";
+  if (fs::exists(field) && CountSplats(field) == 0)
+    throw InputError("is a scene of voxels, which has no page", field, kNoPage);
+}
+
 // False if the program is to end.
 bool AwaitScene(const std::string& folder, ViewSession* session, Console* console) {
   const auto is_there = [&folder] { return fs::exists(folder + "/field.npz"); };
@@ -125,21 +134,21 @@ std::vector<std::string> FlagsWithoutOutside(const std::string& folder, Console*
   OptionSet options;
   settings.Bind(&options);
   const JsonValue plain = options.Values();
-  std::vector<std::string> flags;
+  JsonValue without = JsonValue::Object();
   std::string named;
   const auto refuse = [&](const OutsideOptions& outside) {
     for (const OptionSet::Outside& option : outside) {
       named += " --" + option.name + " '" + option.text + "'";
-      flags.insert(flags.end(), {"--" + option.name, plain.At(option.name).AsString()});
+      without[option.name] = plain.At(option.name);
     }
     return false;
   };
   ResolveSettings({.run_json = run_json, .folder = folder, .accept_outside = refuse}, &options);
-  if (!flags.empty())
-    console->Warn(run_json +
-                  " names what would be run or read elsewhere; the page goes on without:" +
-                  named + ". `regrade stylize` asks for it");
-  return flags;
+  if (named.empty()) return {};
+  console->Warn(run_json +
+                " names what would be run or read elsewhere; the page goes on without:" +
+                named + ". `regrade stylize` asks for it");
+  return {"--config", DumpJson(without, -1)};
 }
 
 }  // namespace
@@ -155,6 +164,7 @@ void RunView(const Command& command, const Arguments& arguments, Console* consol
   if (!prepared) return;
   const std::string& folder = prepared->words[0];
   if (!MayWait(folder, prepared->words)) WantedStyles(folder, prepared->words);  // throws
+  RequireSplats(folder);
   ViewSession session(AbsolutePath(folder), FlagsWithoutOutside(folder, console));
   LocalServer server(session.Routes(), MakeToken());
   console->Info("open " + server.Address());

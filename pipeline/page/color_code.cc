@@ -11,7 +11,7 @@ namespace {
 
 constexpr int kBins = 4096;              // of magnitudes
 constexpr int kMostBits = 12;            // of a number
-constexpr size_t kMostFitted = 1 << 18;  // voxels that a code is fitted to
+constexpr size_t kMostFitted = 1 << 18;  // splats that a code is fitted to
 
 // The errors of one number's values, by its bits.
 class NumberErrors {
@@ -69,7 +69,7 @@ class NumberErrors {
   std::array<Choice, kMostBits + 1> best_;
 };
 
-using Numbers = std::array<double, kCodeNumbers>;  // of one voxel, a basis + j
+using Numbers = std::array<double, kCodeNumbers>;  // of one splat, a basis + j
 
 Numbers Transformed(const float* values, const ColorCode& code, int basis) {
   double turned[3][kCodeHarmonics] = {};
@@ -154,7 +154,7 @@ std::vector<double> NumbersIn(const JsonValue& json, const char* key, size_t cou
 
 }  // namespace
 
-std::vector<size_t> FittedVoxels(size_t n) {
+std::vector<size_t> FittedRows(size_t n) {
   std::vector<size_t> fitted;
   for (size_t i = 0; i < n; i += n / kMostFitted + 1) fitted.push_back(i);
   return fitted;
@@ -226,8 +226,8 @@ std::vector<int16_t> NumbersOf(const ColorRows& rows, const ColorCode& code) {
 }
 
 void PutValues(const std::vector<int16_t>& numbers, const ColorCode& code, int basis,
-               const std::vector<int64_t>& voxel, float* values) {
-  const size_t n = voxel.size();
+               const std::vector<int64_t>& splat, float* values) {
+  const size_t n = splat.size();
 #pragma omp parallel for schedule(static)
   for (size_t i = 0; i < n; ++i) {
     double turned[3][kCodeHarmonics] = {};
@@ -238,7 +238,7 @@ void PutValues(const std::vector<int16_t>& numbers, const ColorCode& code, int b
         for (int c = 0; c < 3; ++c)
           turned[c][j] += code.opponent[static_cast<size_t>(3 * a + c)] * y;
       }
-    float* const row = values + 3 * basis * voxel[i];
+    float* const row = values + 3 * basis * splat[i];
     for (int c = 0; c < 3; ++c)
       for (int k = 0; k < basis; ++k) {
         double sum = 0;

@@ -40,7 +40,7 @@ std::string Thumbnail(const Image& image, int longest) {
                     kQuality);
 }
 
-// What the style of a folder adds to the field voxel by voxel, in the field's order.
+// What the style of a folder adds to the field splat by splat, in the field's order.
 StyleLayers ReadLayers(const std::string& style_folder, const KeptRecords& records) {
   StyleLayers layers;
   if (const std::string file = style_folder + "/residual.npz"; std::filesystem::exists(file))
@@ -95,14 +95,12 @@ const Camera& HomeOf(const PageContent& content) {
   return content.cameras[static_cast<size_t>(content.home)];
 }
 
-// The field, and beside it what takes one core: the coarse scene and the photos.
-void EncodeScene(const RadianceField& field, const WorkingViews& views,
-                 const PageOptions& options, PageContent* content) {
-  std::future<void> beside = std::async(std::launch::async, [&] {
-    content->coarse = EncodeCoarse(field, options.step);
-    AddPhotos(views, options.names == "on", content);
-  });
-  content->field = EncodeField(field, options.step);
+// The field, and beside it the photos, which take one core.
+void EncodeScene(const RadianceField& field, const WorkingViews& views, bool named,
+                 PageContent* content) {
+  std::future<void> beside =
+      std::async(std::launch::async, [&] { AddPhotos(views, named, content); });
+  content->field = EncodeField(field);
   beside.get();
 }
 
@@ -114,7 +112,7 @@ std::string CheckLine(const std::string& what, const PageCheck& check) {
                        check.worst_db, check.mean_db);
 }
 
-// A style of the page `made`, with what it adds to the exact `source` voxel by voxel. It is
+// A style of the page `made`, with what it adds to the exact `source` splat by splat. It is
 // compared with the exact style in the views `checked`; the source's colours are read only
 // then.
 void AddStyle(const std::string& style_folder, const std::string& name,
@@ -124,7 +122,7 @@ void AddStyle(const std::string& style_folder, const std::string& name,
   const RadianceField& source = stored.field;
   const StyleLayers layers = ReadLayers(style_folder, stored.records);
   std::vector<int64_t> of;
-  if (!layers.empty()) of = RecordsInPageOrder(content->field, *source.geometry).voxel;
+  if (!layers.empty()) of = RecordsInPageOrder(content->field, *source.geometry).splat;
   PageStyle style = EncodeStyle(network, made->field, StrengthOf(style_folder),
                                 InPageOrder(layers, of), made->places);
   const Image picture = RenderHome(style.styled, HomeOf(*content));
@@ -136,7 +134,7 @@ void AddStyle(const std::string& style_folder, const std::string& name,
         CheckLine("its style " + name,
                   CheckPage(ExactStyle(source, network, layers), style.styled, checked)));
     if (!style.residual.empty())
-      made->report.push_back(Format("what style %s adds voxel by voxel: %.0f kB of the page",
+      made->report.push_back(Format("what style %s adds splat by splat: %.0f kB of the page",
                                     name.c_str(),
                                     static_cast<double>(InText(style.residual.size())) / 1e3));
   }
@@ -154,7 +152,7 @@ MadePage PageOf(StoredField stored, const std::string& folder,
   const WorkingViews views = ReadWorkingViews(folder + "/poses", kChecked, 0).InField(stored);
   PageContent content;
   content.served = options.served;
-  EncodeScene(stored.field, views, options, &content);
+  EncodeScene(stored.field, views, options.names == "on", &content);
   if (stored.field.appearance.basis > kCodeHarmonics)
     made.report.push_back("the page shows harmonics up to degree 2; higher ones are left out");
   if (!options.check) stored.field.appearance = {};  // fields have gigabytes
@@ -176,10 +174,8 @@ MadePage PageOf(StoredField stored, const std::string& folder,
   ReportOrThrow(progress, steps - 1, steps);
   made.html = PageHtml(content, options.check ? &check : nullptr);
   made.bytes = std::ssize(made.html);
-  made.records = content.field.header.At("voxels").AsInt();
-  made.records_name = RecordsName(content.field);
+  made.splats = content.field.count();
   made.field_bytes = InText(content.field.bytes());
-  if (content.coarse) made.coarse_bytes = InText(content.coarse->bytes());
   for (const PageStyle& style : content.styles)
     made.style_bytes.push_back(InText(style.packed.size()) + InText(style.residual.size()));
   return made;
@@ -215,7 +211,7 @@ class RankedSplats {
     const std::vector<Camera> checked = CheckedViews(photos_, kChecked);
     const PageCheck check = CheckPage(SeenPart(ReadFieldGeometry(path_), path_, checked).field,
                                       page.field, checked);
-    return Concat("the page has those ", page.records, " of ", order_.size(),
+    return Concat("the page has those ", page.splats, " of ", order_.size(),
                   " splats that photos show most: ") +
            CheckLine("its pictures", check);
   }
@@ -230,25 +226,25 @@ class RankedSplats {
 // `before` with more splats; 0 where none fit.
 int64_t FewerSplats(const MadePage& made, const MadePage* before, int64_t most_bytes) {
   double each;  // bytes of a splat
-  if (before != nullptr && before->records > made.records && before->bytes > made.bytes) {
+  if (before != nullptr && before->splats > made.splats && before->bytes > made.bytes) {
     each = static_cast<double>(before->bytes - made.bytes) /
-           static_cast<double>(before->records - made.records);
+           static_cast<double>(before->splats - made.splats);
   } else {
     int64_t of_splats = made.field_bytes;  // and a little of networks
     for (const int64_t bytes : made.style_bytes) of_splats += bytes;
-    each = static_cast<double>(of_splats) / static_cast<double>(made.records);
+    each = static_cast<double>(of_splats) / static_cast<double>(made.splats);
   }
   const double too_many = static_cast<double>(made.bytes - most_bytes) / each;
-  return std::max(int64_t{0}, made.records - 1 - static_cast<int64_t>(1.02 * too_many));
+  return std::max(int64_t{0}, made.splats - 1 - static_cast<int64_t>(1.02 * too_many));
 }
 
-MadePage PageWithin(const std::string& folder, const std::vector<std::string>& styles,
-                    const PageOptions& options, const ProgressFunction& progress) {
+MadePage PageWithin(const std::string& folder, int64_t count,
+                    const std::vector<std::string>& styles, const PageOptions& options,
+                    const ProgressFunction& progress) {
   constexpr int kTries = 4;                 // the fewer splats, the more bytes each
   constexpr int64_t kLeastSplatBytes = 12;  // saves a try that cannot do
   const std::string path = folder + "/field.npz";
-  const int64_t count = CountSplats(path);
-  int64_t most = count > 0 ? options.most_bytes / kLeastSplatBytes : 1;
+  int64_t most = options.most_bytes / kLeastSplatBytes;
   std::optional<RankedSplats> ranked;
   std::optional<MadePage> before;
   for (int i = 1;; ++i) {
@@ -261,7 +257,7 @@ MadePage PageWithin(const std::string& folder, const std::vector<std::string>& s
     if (fits) return made;
     most = FewerSplats(made, before ? &*before : nullptr, options.most_bytes);
     made.html.clear();
-    if (count == 0 || most == 0 || i == kTries) return made;
+    if (most == 0 || i == kTries) return made;
     before = std::move(made);
   }
 }
@@ -271,9 +267,12 @@ MadePage PageWithin(const std::string& folder, const std::vector<std::string>& s
 MadePage MakePage(const std::string& folder, const std::vector<std::string>& styles,
                   const PageOptions& options, const ProgressFunction& progress) {
   ReportOrThrow(progress, 0, 1);
-  MadePage made = options.most_bytes > 0 ? PageWithin(folder, styles, options, progress)
-                                         : PageOf(ReadFieldFile(folder + "/field.npz"), folder,
-                                                  styles, options, progress);
+  const std::string path = folder + "/field.npz";
+  const int64_t count = CountSplats(path);
+  if (count == 0) throw InputError("is a scene of voxels, which has no page", path, kNoPage);
+  MadePage made = options.most_bytes > 0
+                      ? PageWithin(folder, count, styles, options, progress)
+                      : PageOf(ReadFieldFile(path), folder, styles, options, progress);
   if (!options.served) made.field = {}, made.places = {};
   return made;
 }

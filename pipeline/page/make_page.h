@@ -13,7 +13,6 @@
 namespace regrade {
 
 struct PageOptions {
-  double step = 0.03;
   bool check = false;
   std::string names = "on";
   bool served = false;     // by `regrade view`
@@ -32,21 +31,25 @@ struct PageOptions {
   }
 };
 
+// What helps where a scene is of voxels.
+inline constexpr char kNoPage[] =
+    "fit it without --field voxels and --preset paper, or write splats of it with `regrade "
+    "export --format glb`";
+
 struct MadePage {
-  std::string html;                      // empty where the page would have more than most_bytes
-  int64_t bytes = 0;                     // that it would have
-  int64_t records = 0, field_bytes = 0;  // in the text of the page
-  const char* records_name = "";         // see RecordsName
-  int64_t coarse_bytes = 0;              // of what is shown first
+  std::string html;                     // empty where the page would have more than most_bytes
+  int64_t bytes = 0;                    // that it would have
+  int64_t splats = 0, field_bytes = 0;  // in the text of the page
   std::vector<int64_t> style_bytes;
   std::vector<std::string> report;  // what is left out, at what cost, and the lines of --check
   RadianceField field;              // as the page has it
-  PageRecords places;               // its records, as the page orders them
+  PageRecords places;               // its splats, as the page orders them
 };
 
-// `styles`: names in `folder`; with what they add voxel by voxel. Where most_bytes do not hold
+// `styles`: names in `folder`; with what they add splat by splat. Where most_bytes do not hold
 // all splats, the page has those that photos show most, see ByWhatIsShown, and the report says
-// how far its pictures are from the exact ones. Throws Error(kInput).
+// how far its pictures are from the exact ones. Throws Error(kInput), of a scene of voxels,
+// too.
 MadePage MakePage(const std::string& folder, const std::vector<std::string>& styles,
                   const PageOptions& options, const ProgressFunction& progress);
 

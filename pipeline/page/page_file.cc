@@ -49,10 +49,6 @@ std::string InElement(std::string json) {
 JsonValue Header(const PageContent& content, const PageCheck* check) {
   JsonValue header = content.field.header;
   const Camera& first = content.cameras.at(0);
-  header["ndc"] =
-      first.ndc.on() ? JsonValue(JsonValue::Array{first.ndc.a, first.ndc.b}) : JsonValue();
-  if (header.Find("spheres") == nullptr) header["spheres"] = JsonValue();
-  header["coarse"] = content.coarse ? content.coarse->header : JsonValue();
   header["home"] = content.home;
   Vec3d up{};
   JsonValue::Array cameras;
@@ -114,9 +110,6 @@ std::string PageHtml(const PageContent& content, const PageCheck* check) {
     sections += "<script type=\"application/octet-stream\" id=\"" + name + "\">" +
                 Base64(packed) + "</script>\n";
   };
-  if (content.coarse)
-    for (const PageSection& section : content.coarse->sections)
-      add("coarse_" + section.name, section.packed);
   for (const PageSection& section : content.field.sections) add(section.name, section.packed);
   for (size_t i = 0; i < content.styles.size(); ++i)
     add("network_" + std::to_string(i), content.styles[i].packed);

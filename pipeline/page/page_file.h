@@ -5,7 +5,6 @@
 // Its policy lets it load nothing: style sheet and script are named by their hashes.
 #pragma once
 
-#include <optional>
 #include <string>
 #include <vector>
 
@@ -25,7 +24,6 @@ struct PagePhoto {
 
 struct PageContent {
   PageField field;
-  std::optional<PageField> coarse;  // shown until the field is unpacked
   std::vector<PageStyle> styles;
   std::vector<std::string> style_pictures;  // JPEG, of each style: the home view
   std::vector<Camera> cameras;              // of the photos, in the field's frame

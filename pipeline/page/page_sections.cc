@@ -64,7 +64,7 @@ ColorCode CodeOfRows(const ColorRows& rows, const std::vector<EarlierRecords>& e
                      double step, const std::vector<float>& weight) {
   const int channels = 3 * rows.basis;
   std::vector<float> values, differences, weights;
-  for (const size_t i : FittedVoxels(rows.size())) {
+  for (const size_t i : FittedRows(rows.size())) {
     values.insert(values.end(), rows[i], rows[i] + channels);
     for (int c = 0; c < channels; ++c)
       differences.push_back(rows[i][c] - EarlierMean(rows, earlier[i], c));

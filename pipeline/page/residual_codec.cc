@@ -16,6 +16,11 @@ int16_t Byte(float part) {
   return static_cast<int16_t>(std::floor(std::clamp(double{part}, 0.0, 1.0) * 255 + 0.5));
 }
 
+// (code - 128) * scale.
+uint8_t CodeOf(double value, double scale) {
+  return static_cast<uint8_t>(std::floor(std::clamp(value / scale, -127.0, 127.0) + 128.5));
+}
+
 }  // namespace
 
 PageResidual EncodeResidual(const StyleLayers& layers,
@@ -57,13 +62,13 @@ PageResidual EncodeResidual(const StyleLayers& layers,
   return page;
 }
 
-void ApplyLayers(const StyleLayers& layers, const std::vector<int64_t>& voxels,
+void ApplyLayers(const StyleLayers& layers, const std::vector<int64_t>& splats,
                  const RadianceField& source, RadianceField* styled) {
   const int stride = styled->appearance.stride(), basis = styled->appearance.basis;
   const int own = source.appearance.basis;  // what it lacks counts as 0
-  for (size_t i = 0; i < voxels.size(); ++i) {
-    float* const sh = styled->appearance.sh.data() + voxels[i] * stride;
-    const float* const before = source.appearance.sh.data() + voxels[i] * 3 * own;
+  for (size_t i = 0; i < splats.size(); ++i) {
+    float* const sh = styled->appearance.sh.data() + splats[i] * stride;
+    const float* const before = source.appearance.sh.data() + splats[i] * 3 * own;
     for (int j = 0; j < stride; ++j) {
       const int c = j / basis, k = j % basis;
       if (!layers.residual.color.empty() && k == 0)
@@ -75,9 +80,7 @@ void ApplyLayers(const StyleLayers& layers, const std::vector<int64_t>& voxels,
                 layers.weight[i] * sh[j];
     }
   }
-  if (layers.weight.empty()) return;
-  styled->background = source.background;
-  styled->appearance.sphere_color = source.appearance.sphere_color;
+  if (!layers.weight.empty()) styled->background = source.background;
 }
 
 }  // namespace regrade

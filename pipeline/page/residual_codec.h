@@ -1,4 +1,4 @@
-// Packs what a style adds voxel by voxel behind its network, for a page: a residual of colours
+// Packs what a style adds splat by splat behind its network, for a page: a residual of colours
 // with its scale of what changes with the view (see EQ(view-scale)), and the weights of masked
 // objects.
 //
@@ -13,12 +13,12 @@
 
 #include "kernels/field/radiance_field.h"
 #include "pipeline/files/json_file.h"
-#include "pipeline/page/page_order.h"
+#include "pipeline/page/value_codec.h"
 #include "stylize/field/voxel_residual.h"
 
 namespace regrade {
 
-// Of voxels in any one order; empty where there is none.
+// Of splats in any one order; empty where there is none.
 struct StyleLayers {
   VoxelResidual residual;
   std::vector<float> weight;
@@ -34,13 +34,13 @@ struct PageResidual {
   StyleLayers rounded;  // as the page has them
 };
 
-// `layers` in the order of `voxels`, whose earlier ones are `earlier`.
+// `layers` in the order of the splats, whose earlier ones are `earlier`.
 PageResidual EncodeResidual(const StyleLayers& layers,
                             const std::vector<EarlierRecords>& earlier);
 
-// Adds them to the styled coefficients; layer i is that of voxels[i]. Coefficients and
+// Adds them to the styled coefficients; layer i is that of splats[i]. Coefficients and
 // background colours are the source's where the weights are 0; see EQ(style-mix).
-void ApplyLayers(const StyleLayers& layers, const std::vector<int64_t>& voxels,
+void ApplyLayers(const StyleLayers& layers, const std::vector<int64_t>& splats,
                  const RadianceField& source, RadianceField* styled);
 
 }  // namespace regrade

@@ -8,7 +8,6 @@
 #include "kernels/base/error.h"
 #include "kernels/base/morton.h"
 #include "kernels/splats/extent.h"
-#include "pipeline/page/value_codec.h"
 
 namespace regrade {
 namespace {

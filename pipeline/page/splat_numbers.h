@@ -18,7 +18,7 @@
 
 #include "kernels/field/radiance_field.h"
 #include "kernels/splats/splats.h"
-#include "pipeline/page/field_codec.h"
+#include "pipeline/page/value_codec.h"
 
 namespace regrade {
 

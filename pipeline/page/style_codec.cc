@@ -10,7 +10,6 @@
 #include "kernels/network/fused_mlp.h"
 #include "pipeline/files/deflate.h"
 #include "pipeline/page/color_code.h"
-#include "pipeline/page/value_codec.h"
 #include "stylize/field/apply_network.h"
 #include "stylize/field/base_map.h"
 #include "stylize/training/restyle_field.h"
@@ -28,23 +27,13 @@ void RoundToHalves(std::vector<float>* values, std::string* bytes) {
   }
 }
 
-std::vector<double> RoundToCodes(Buffer<float>* values, int channels) {
-  std::vector<float> copy(values->begin(), values->end());
-  const std::vector<double> scale = CodeScales(copy, channels);
-  for (int64_t i = 0; i < values->size(); ++i) {
-    const double s = scale[static_cast<size_t>(i % channels)];
-    (*values)[i] = static_cast<float>((CodeOf((*values)[i], s) - 128) * s);
-  }
-  return scale;
-}
-
 ColorCode RoundToWords(const Geometry& geometry, Buffer<float>* sh) {
-  std::vector<int64_t> voxel(static_cast<size_t>(geometry.num_voxels()));
-  std::iota(voxel.begin(), voxel.end(), 0);
-  const ColorRows rows{sh->data(), kStyledBasis, voxel};
-  const std::vector<float> opacity = ColorWeights(geometry);
+  std::vector<int64_t> splat(static_cast<size_t>(geometry.num_voxels()));
+  std::iota(splat.begin(), splat.end(), 0);
+  const ColorRows rows{sh->data(), kStyledBasis, splat};
+  const std::vector<float> opacity = LightOfSplats(geometry);
   std::vector<float> values, spread, weight;
-  for (const size_t i : FittedVoxels(rows.size())) {
+  for (const size_t i : FittedRows(rows.size())) {
     weight.push_back(opacity[i]);
     for (int c = 0; c < 3 * kStyledBasis; ++c) {
       values.push_back(rows[i][c]);
@@ -52,7 +41,7 @@ ColorCode RoundToWords(const Geometry& geometry, Buffer<float>* sh) {
     }
   }
   const ColorCode code = FitColorCode(spread, values, kStyledBasis, 0, weight);
-  PutValues(NumbersOf(rows, code), code, kStyledBasis, voxel, sh->data());
+  PutValues(NumbersOf(rows, code), code, kStyledBasis, splat, sh->data());
   return code;
 }
 
@@ -82,10 +71,6 @@ DenseNetwork<float> OfPagesHarmonics(const LipschitzNetwork& network) {
   dense.layers.front() = std::move(inputs);
   dense.layers.back() = std::move(outputs);
   return dense;
-}
-
-JsonValue::Array ArrayOf(const std::vector<double>& values) {
-  return {values.begin(), values.end()};
 }
 
 }  // namespace
@@ -118,13 +103,11 @@ PageStyle EncodeStyle(const StoredNetwork& stored, const RadianceField& page, do
   JsonValue residual;
   if (!layers.empty()) {
     PageResidual packed = EncodeResidual(layers, places.earlier);
-    ApplyLayers(packed.rounded, places.voxel, page, &style.styled);
+    ApplyLayers(packed.rounded, places.splat, page, &style.styled);
     style.residual = std::move(packed.packed);
     residual = std::move(packed.header);
   }
   const ColorCode code = RoundToWords(*page.geometry, &style.styled.appearance.sh);
-  const std::vector<double> sphere_scale =
-      RoundToCodes(&style.styled.appearance.sphere_color, 3);
   const RowMap base = BaseOf(data);
   JsonValue::Array matrix;
   for (int r = 0; r < 3; ++r)
@@ -138,7 +121,6 @@ PageStyle EncodeStyle(const StoredNetwork& stored, const RadianceField& page, do
                                    {"base", std::move(matrix)},
                                    {"constant", array(base.constant)},
                                    {"color", JsonOf(code)},
-                                   {"sphere_scale", ArrayOf(sphere_scale)},
                                    {"background", array(style.styled.background)},
                                    {"residual", std::move(residual)},
                                    {"strength", strength},
@@ -147,9 +129,9 @@ PageStyle EncodeStyle(const StoredNetwork& stored, const RadianceField& page, do
   return style;
 }
 
-std::string StyledWords(const PageStyle& style, const std::vector<int64_t>& voxels) {
+std::string StyledWords(const PageStyle& style, const std::vector<int64_t>& splats) {
   const ColorCode code = ColorCodeOf(style.header.At("color"));
-  return WordsOf(NumbersOf({style.styled.appearance.sh.data(), kStyledBasis, voxels}, code),
+  return WordsOf(NumbersOf({style.styled.appearance.sh.data(), kStyledBasis, splats}, code),
                  code);
 }
 

@@ -1,9 +1,9 @@
-// The orthogonal transform that decorrelates a voxel's colour coefficients before they are
+// The orthogonal transform that decorrelates a splat's colour coefficients before they are
 // rounded.
 //
 // Of all orthogonal transforms the Karhunen-Loeve transform, the eigenvectors of the
 // covariance, needs the fewest bits at one rounding error, and an orthogonal transform leaves
-// the error's sum of squares as it is. It is found for differences between neighbouring voxels,
+// the error's sum of squares as it is. It is found for differences between neighbouring splats,
 // which are what is stored.
 #pragma once
 
@@ -11,8 +11,6 @@
 #include <vector>
 
 namespace regrade {
-
-inline constexpr int kMaxChannels = 27;
 
 // matrix [channels, channels]: coefficients = transposed(matrix) * stored values.
 struct ValueTransform {

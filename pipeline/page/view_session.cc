@@ -66,7 +66,7 @@ void ViewSession::MakePageOf(const std::vector<std::string>& styles,
   MadePage made = MakePage(folder_, styles, {.served = true}, tell);
   page_ = std::move(made.html);
   field_ = std::move(made.field);
-  voxels_ = std::move(made.places.voxel);
+  splats_ = std::move(made.places.splat);
   const std::lock_guard lock(mutex_);
   made_ = true;
 }
@@ -241,7 +241,7 @@ ViewSession::Served ViewSession::Serve(const StoredNetwork& network, const std::
   style.header["id"] = id;
   style.header["name"] = name;
   style.header["weights"] = Base64(style.packed);
-  return {DumpJson(style.header, -1), StyledWords(style, voxels_)};
+  return {DumpJson(style.header, -1), StyledWords(style, splats_)};
 }
 
 }  // namespace regrade

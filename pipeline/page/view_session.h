@@ -10,8 +10,8 @@
 //   DELETE /job   cancels it
 //   GET /learning the network of the style that is being learned, so far, or nothing new
 //   GET /style    the network of the style that was learned last, as the page holds it
-//   GET /learning/codes, /style/codes    what these networks make of the page's voxels, for a
-//                 page whose graphics processor is slow: 27 bytes a voxel, in the page's order
+//   GET /learning/codes, /style/codes    what these networks make of the page's splats, for a
+//                 page whose graphics processor is slow: 16 bytes a splat, in the page's order
 //   GET /film     the film that was rendered last
 #pragma once
 
@@ -64,7 +64,7 @@ class ViewSession {
   const std::vector<std::string> style_flags_;
   std::string page_;             // with the next two unchanged once made_ is set
   RadianceField field_;          // the page's
-  std::vector<int64_t> voxels_;  // of the field, in the page's order
+  std::vector<int64_t> splats_;  // of the field, in the page's order
   mutable std::mutex mutex_;     // of what follows: pages and jobs end on their own threads
   bool made_ = false;
   std::string awaited_;

@@ -123,6 +123,8 @@ void CheckTogether(const RunSettings& settings) {
   if (!settings.depth.network.empty() && settings.scene.Kind().lattice)
     throw UsageError("voxels are fitted without depths", "--depth-network",
                      "leave it out, or give --field splats");
+  if (settings.page.page == "on" && settings.scene.Kind().lattice)
+    throw UsageError("voxels have no page", "--page on", "leave it out, or fit splats");
   const StyleMethod method = ParseStyleMethod(settings.style_2d);
   CheckResidual(settings, method.kind);
   CheckMatch(settings);

@@ -146,10 +146,8 @@ struct PageChoice {
   template <typename Bind>
   void Describe(Bind& bind) {
     bind("page", page,
-         {.help =
-              "writes scene.html, the scene and its style to walk through in a browser: "
-              "auto keeps it below 25 MB: of a large field it has the splats that photos show "
-              "most, and of one of voxels there is none",
+         {.help = "writes scene.html, the scene of splats and its style to walk through in a "
+                  "browser: auto keeps it below 25 MB with the splats that photos show most",
           .choices = "auto|on|off"});
   }
 };

@@ -13,8 +13,7 @@ namespace {
 // Seconds with two threads (AMD EPYC) for a million pixels: of files that are decoded, of
 // photos that the 2D method styles, of frames with both fields and the 2D method, and
 // of compared pairs; and of a report with its page.
-constexpr double kDecode = 0.03, kStyle2d = 0.17, kFrame = 2.3, kPair = 0.55, kReport = 3,
-                 kPageOfMillionVoxels = 3.75;
+constexpr double kDecode = 0.03, kStyle2d = 0.17, kFrame = 2.3, kPair = 0.55, kReport = 3;
 constexpr double kAroundFit = 1.16;        // the trial of degrees, pruning and measuring
 constexpr double kOfResidual = 1.5;        // of frames at the photos' places
 constexpr double kFasterOnCard = 1.0 / 8;  // training and frames, roughly
@@ -60,13 +59,6 @@ double EvaluateSeconds(const RunSettings& settings, const CaptureSize& size) {
           0, std::ssize(SamplesOfFilm(render.film_seconds, render.fps).moments) - gap);
   }
   return kPair * pairs * Megapixels(size, settings.scene.photo_size);
-}
-
-// Beyond a report's: a page of splats takes no longer.
-double PageSeconds(const RunSettings& settings) {
-  const FitOptions& fit = settings.fit;
-  if (settings.page.page == "off" || settings.scene.field != "voxels") return 0;
-  return kPageOfMillionVoxels * 1e-6 * PlannedVoxels(fit, {}, fit.resolutions.size() - 1);
 }
 
 }  // namespace
@@ -116,7 +108,7 @@ std::vector<StageEstimate> EstimateStages(const RunSettings& settings, const Cap
       {"stylize", on_card * stylize.seconds, stylize.memory},
       {"render", on_card * Scaled(RenderSeconds(settings, size), threads)},
       {"evaluate", Scaled(EvaluateSeconds(settings, size), threads)},
-      {"report", Scaled(kReport + PageSeconds(settings), threads)},
+      {"report", Scaled(kReport, threads)},
   };
 }
 

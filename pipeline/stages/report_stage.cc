@@ -105,7 +105,7 @@ ReportPictures PicturesOf(const RunContext& context, const RunReport& report) {
   return pictures;
 }
 
-// scene.html beside the report; false where it is not wanted or too large.
+// scene.html beside the report; false where it is not wanted, too large or of voxels.
 bool WriteScenePage(const RunContext& context, const ProgressFunction& progress) {
   constexpr int64_t kLargest = 25'000'000;  // bytes, of --page auto
   const std::string& choice = context.settings.page.page;
@@ -113,6 +113,10 @@ bool WriteScenePage(const RunContext& context, const ProgressFunction& progress)
   const std::string path = style.Path(kScenePage);
   std::filesystem::remove(path);
   if (choice == "off") return false;
+  if (CountSplats(context.workspace->Path("field.npz")) == 0) {
+    context.console->Info(Concat("no page: the scene is of voxels; ", kNoPage));
+    return false;
+  }
   const std::string name = std::filesystem::path(style.folder()).filename().string();
   PageOptions options{.names = "styles"};
   if (choice == "auto") options.most_bytes = kLargest;

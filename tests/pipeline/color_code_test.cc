@@ -146,9 +146,9 @@ TEST(PageColorCode, RowsMayComeInAnyOrder) {
 }
 
 TEST(PageColorCode, AMillionVoxelsAreFittedToSome) {
-  EXPECT_EQ(FittedVoxels(5).size(), 5u);
-  EXPECT_TRUE(FittedVoxels(0).empty());
-  const std::vector<size_t> some = FittedVoxels(1000000);
+  EXPECT_EQ(FittedRows(5).size(), 5u);
+  EXPECT_TRUE(FittedRows(0).empty());
+  const std::vector<size_t> some = FittedRows(1000000);
   EXPECT_LE(some.size(), size_t{1} << 18);
   EXPECT_GT(some.size(), size_t{1} << 17);
   EXPECT_GT(some.back(), 999990u);

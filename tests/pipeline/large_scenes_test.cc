@@ -104,7 +104,7 @@ TEST(Page, OfAFieldThatIsTooLargeHasWhatPhotosShowMost) {
   EXPECT_EQ(roomy.html, whole.html);
   EXPECT_LE(std::ssize(tight.html), whole.bytes - 5000);
   EXPECT_GT(std::ssize(tight.html), whole.bytes - 20000);
-  EXPECT_LT(tight.records, whole.records);
+  EXPECT_LT(tight.splats, whole.splats);
   EXPECT_GT(tight.report.size(), whole.report.size());
   const MadePage none = page(1000);
   EXPECT_TRUE(none.html.empty());

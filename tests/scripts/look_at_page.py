@@ -5,8 +5,8 @@
 
 FOLDER is write_scene_pages's: pages NAME.html with views and pixels in NAME.json. Checked of each page: its pictures, its style's bound,
 nothing asked of the network, nothing on the console (a violation of the page's policy is an error there), no scrolling
-sideways at the sizes of a phone and a desktop, where words and the first view are in the window, names; of some, that it opens styled, that a coarse picture comes first and that workers aren't needed; of that
-of splats, that keys and the slider change the picture. Everything
+sideways at the sizes of a phone and a desktop, where words and the first view are in the window, names; of some, that it opens styled, that a coarse picture comes first and that workers aren't needed; of one, that keys and
+the slider change the picture. Everything
 that keys can do is walk_page.py's, long use and damage strain_page.py's.
 --shots keeps pictures of the pages. Exit status 1 if anything is wrong, 77 if there is no Chromium.
 """
@@ -218,7 +218,7 @@ def check_folder(browser, arguments):
         print(name)
         with open(path[:-5] + ".json", encoding="utf-8") as file:
             views = json.load(file)
-        splats = name == "splats"  # the quickest to draw: what hangs on no field is checked there
+        splats = name == "splats"  # what hangs on no field is checked there
         for size_name, size in SIZES.items() if splats else [("phone", SIZES["phone"])]:
             page = open_page(browser, path, size, scale=1 if arguments.shots else FEW_PIXELS)
             here = check_controls(page, size[0]) + check_places(page, size) + check_names(page)
@@ -233,9 +233,9 @@ def check_folder(browser, arguments):
             here += complaints(page)
             found += [f"{name}, {size_name}: {complaint}" for complaint in here]
             page.close()
-        if name in ("near_object", "splats"):
+        if name in ("object", "splats"):
             found += [f"{name}, opening: {c}" for c in check_coarse_first(browser, path) + check_without_workers(browser, path, views, splats)]
-        if name in ("grid_residual", "splats"):
+        if splats:
             found += [f"{name}, {c}" for c in check_graphics(browser, path, views)]
     return found
 

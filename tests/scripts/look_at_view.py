@@ -35,7 +35,7 @@ DROP = """(async () => {
           weights: regradePage.weights(), after: regradePage.state.map, message: message.textContent};
 })()"""
 
-# The style as the program sent its voxels, and as the page's own pass makes them: decibels between two pictures.
+# The style as the program sent its splats, and as the page's own pass makes them: decibels between two pictures.
 CODES = """(async () => {
   const p = regradePage, last = p.header.styles.length - 1, width = 96, height = 72;
   const view = {...p.view.at(width, height), width, height, weights: p.header.styles.map((_, i) => i === last ? 1 : 0)};
@@ -94,10 +94,10 @@ def check_view(browser, address, folder, shots, size):
     if done["shown"] == [] or not os.path.exists(os.path.join(folder, "styles", "sun_set", "network.npz")):
         found.append("the style is not in the folder")
     own, plain, again = page.value(CODES)
-    print(f"  the voxels that the program styled: {own:.1f} dB from those of the page's own pass, {plain:.1f} dB from the scene")
+    print(f"  the splats that the program styled: {own:.1f} dB from those of the page's own pass, {plain:.1f} dB from the scene")
     # As the bar between two arithmetics in page_pictures.py.
     if own < 50 or plain > 40 or not again:
-        found.append("the voxels that the program styled are not those of its network")
+        found.append("the splats that the program styled are not those of its network")
     size, film = page.value(FILM), os.path.join(folder, "films", "film.mp4")
     if not os.path.exists(film) or size != os.path.getsize(film):
         found.append("the exact film did not come")

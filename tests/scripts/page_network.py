@@ -1,13 +1,13 @@
 #!/usr/bin/env python3
-"""Compares a page's styled voxels with the style's certified bound, and its pictures with the program's.
+"""Compares a page's styled splats with the style's certified bound, and its pictures with the program's.
 
   page_network.py FOLDER [--chromium PROGRAM]
 
 FOLDER is write_scene_pages's, of small fields or of a run (write_scene_pages FOLDER RUN STYLE): pages NAME.html with views
 and pixels in NAME.json. The program and the page start from the same coefficients, as the page has them. Exit status 1
-if a picture or a pair of voxels is out of bounds, 77 if there is no Chromium.
+if a picture or a pair of splats is out of bounds, 77 if there is no Chromium.
 
-The bound of pairs of voxels x, y, with f of EQ(liprf-network) and bound K = ||A|| + R of EQ(liprf-bound):
+The bound of pairs of splats x, y, with f of EQ(liprf-network) and bound K = ||A|| + R of EQ(liprf-bound):
   |F(x) - F(y)| <= (||A|| + R prod_l (1 + d_l / (s_l - d_l))) |x - y| + |c| + 2 e
 F is f with weights rounded to halves and results rounded to numbers. A layer's weights W change by at most d = 2^-11 |W|_F,
 and 2^-25 each where they are below the smallest normal half; s <= ||W|| comes from power iterations. Rounding to numbers
@@ -26,9 +26,9 @@ from browser import SIZES, complaints, open_page, parsed, parser_of, running, st
 from page_pictures import compare_pictures
 
 BOUND = """(async () => {
-  const p = regradePage, gl = p.graphics.gl, style = p.header.styles[0], {source} = p.scene, n = p.scene.slots;
+  const p = regradePage, gl = p.graphics.gl, style = p.header.styles[0], {source} = p.scene, n = p.scene.count;
   await p.load(0);
-  const framebuffer = gl.createFramebuffer(), rows = Math.ceil(p.scene.slots / 2048);
+  const framebuffer = gl.createFramebuffer(), rows = Math.ceil(p.scene.count / 2048);
   const words = (texture) => {
     const data = new Uint32Array(4 * 2048 * rows);
     gl.bindFramebuffer(gl.FRAMEBUFFER, framebuffer);
@@ -39,7 +39,7 @@ BOUND = """(async () => {
   const styled = p.colors[0], before27 = words(source.color), after27 = words(styled.color);
   const places = new Uint32Array(await p.scene.kept.place.arrayBuffer());
   gl.deleteFramebuffer(framebuffer);
-  // A voxel's numbers, times their steps: coefficients but for a rotation, which keeps distances.
+  // A splat's numbers, times their steps: coefficients but for a rotation, which keeps distances.
   const ORDER = [[0, 11, 4, 21, 14, 24, 17], [1, 18, 19, 6, 7, 16, 25], [9, 3, 12, 13, 22, 23, 26], [2, 10, 5, 20, 15, 8]];
   const numbers = (data, code, i, to) => ORDER.forEach((list, w) => {
     let word = data[4 * i + w];
@@ -97,7 +97,7 @@ BOUND = """(async () => {
   for (let i = 0; i < n; ++i) {
     features(i, x);
     numbers(after27, styled.code, i, own);
-    // The next voxel is near by, the other one anywhere.
+    // The next splat is near by, the other one anywhere.
     for (const j of [(i + 1) % n, (Math.imul(i + 1, 2654435761) >>> 0) % n]) {
       if (j === i) continue;
       features(j, y);
@@ -113,7 +113,7 @@ BOUND = """(async () => {
       if (before > 10 * allowed) steepest = Math.max(steepest, after / before);
     }
   }
-  return {voxels: n, pairs, over, steepest, closest, certified: style.bound, bound, allowed};
+  return {splats: n, pairs, over, steepest, closest, certified: style.bound, bound, allowed};
 })()"""
 
 
@@ -121,9 +121,9 @@ def check_bound(page):
     if page.value("!!regradePage.header.styles[0].residual"):
         return []  # the bound is the network's, and says nothing of what is added at two positions
     got = page.value(BOUND)
-    print(f"  bound: {got['voxels']} voxels, {got['pairs']} pairs, {got['over']} over {got['bound']:.4f} |x - y| + {got['allowed']:.4f} "
+    print(f"  bound: {got['splats']} splats, {got['pairs']} pairs, {got['over']} over {got['bound']:.4f} |x - y| + {got['allowed']:.4f} "
           f"(certified {got['certified']:.4f}), nearest {100 * got['closest']:.1f} % of it, steepest {got['steepest']:.3f}")
-    return [f"{got['over']} pairs of voxels exceed the certified bound"] if got["over"] else []
+    return [f"{got['over']} pairs of splats exceed the certified bound"] if got["over"] else []
 
 
 def main():

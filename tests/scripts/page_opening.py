@@ -54,7 +54,7 @@ def check_styled_first(page):
         found.append("the style does not begin with its strength")
     for_object = bool((style.get("residual") or {}).get("weight"))
     words = page.value("message.textContent")
-    # What a style does to an object only is not known of coarse voxels.
+    # What a style does to an object only is not known of a coarse scene.
     if page.value("style0.disabled") != for_object or (style["name"] in words) != for_object:
         found.append(f"the slider of what {'is not' if for_object else 'is'} shown is wrong, or the words: '{words}'")
     if for_object:
@@ -112,8 +112,8 @@ def check_coarse_first(browser, path):
     counted = page.value("""(() => {
       const p = regradePage, {scene, painter} = p, sum = (list) => list.filter(Boolean).reduce((all, t) => all + t.bytes, 0);
       const sets = [scene.source, ...p.colors.filter(Boolean)], {empty} = p.graphics;
-      const {full, coarse} = painter, parts = [...scene.parts, ...sets.flatMap((s) => [s.color, s.texel])];
-      return [p.graphics.bytes, sum([...new Set(parts), full, full.sum, coarse, coarse.sum, empty.u, empty.i, empty.p])];
+      const {full, coarse} = painter, parts = [...scene.parts, scene.corners, ...sets.map((s) => s.color)];
+      return [p.graphics.bytes, sum([...new Set(parts), full, full.sum, coarse, coarse.sum, empty.u, empty.p])];
     })()""")
     if counted[0] != counted[1] or coarse <= 0:
         found.append(f"{counted[0]} bytes are on the graphics processor, and the scene needs {counted[1]}")

@@ -36,7 +36,7 @@ COUNTER = """(() => {
   wrap('bindTexture', (_, [, texture]) => bound.set(unit, texture));
   wrap('bindBuffer', (_, [target, buffer]) => bound.set('buffer' + target, buffer));
   wrap('texStorage2D', (_, [, , format, width, height]) => {
-    const bytes = {[P.RGBA32UI]: 16, [P.RG32UI]: 8, [P.R32I]: 4, [P.RGBA8]: 4}[format];
+    const bytes = {[P.RGBA32UI]: 16, [P.RG32UI]: 8, [P.R32I]: 4, [P.RGBA8]: 4, [P.RGBA16F]: 8}[format];
     if (!bytes) throw new Error('a texture of a format that is not counted');
     all.set(bound.get(unit), bytes * width * height);
   });
@@ -83,7 +83,7 @@ def memory(page):
         heaps.append(heap["usedSize"] + heap.get("embedderHeapUsedSize", 0) + heap.get("backingStorageSize", 0))
     # The picture while moving has as many pixels as there is time for.
     gpu = page.value("(() => { const s = gpu.size(), c = regradePage.painter.coarse, own = regradePage.graphics.bytes, moving = "
-                     "4 * c.width * c.height; return {objects: s.objects, bytes: s.bytes - moving, own: own - moving, "
+                     "(c.sum ? 12 : 4) * c.width * c.height; return {objects: s.objects, bytes: s.bytes - moving, own: own - moving, "
                      "all: s.bytes - moving} })()")
     return {"heap": min(heaps), "elements": page.value("document.querySelectorAll('*').length"), **gpu}
 
@@ -162,10 +162,10 @@ def check_damaged(browser, path, folder):
         text = file.read()
     part = r'(id="color">)([^<]{40})'
     for name, damaged in {
-            "missing": re.sub(r'<script type="application/octet-stream" id="density">[^<]*</script>', "", text),
+            "missing": re.sub(r'<script type="application/octet-stream" id="shape">[^<]*</script>', "", text),
             "bytes": re.sub(part, lambda m: m[1] + m[2][:20] + m[2][:20], text),
             "base64": re.sub(part, lambda m: m[1] + "!!!" + m[2], text),
-            "header": text.replace('"resolution":[', '"resolution":["x",', 1),
+            "header": text.replace('"center":[', '"center":["x",', 1),
             "json": re.sub(r'(id="scene">)\{', r"\1", text),
             "end": text[:text.index('id="color">') + 400]}.items():
         copy = os.path.join(folder, "damaged_" + name + ".html")

@@ -1,4 +1,4 @@
-// Writes small pages of every kind of field, and what this program renders of them:
+// Writes small pages of splats, and what this program renders of them:
 // write_scene_pages FOLDER [RUN STYLE]. For tests that open them in a browser. With an output
 // folder and one of its styles only that page is written, with pictures of the checked views.
 //
@@ -21,7 +21,6 @@
 #include "pipeline/files/atomic_file.h"
 #include "pipeline/images/image_file.h"
 #include "pipeline/page/check_page.h"
-#include "pipeline/page/coarse_field.h"
 #include "pipeline/page/keyframes.h"
 #include "pipeline/page/make_page.h"
 #include "pipeline/page/page_file.h"
@@ -32,7 +31,6 @@
 #include "stylize/training/initial_network.h"
 #include "tests/support/keyframes.h"
 #include "tests/support/pinhole.h"
-#include "tests/support/small_field.h"
 #include "tests/support/small_splats.h"
 
 namespace regrade {
@@ -47,22 +45,11 @@ Camera LookingAt(const Vec3d& eye, const Vec3d& at, double focal) {
   return camera;
 }
 
-// Around the box of SmallFrame, and one inside it; or in front of it, in device coordinates.
-std::vector<Camera> CamerasOf(bool forward_facing) {
-  std::vector<Camera> cameras;
-  if (forward_facing)
-    for (const double x : {-0.2, 0.0, 0.3}) {
-      Camera camera = LookingAt({x, 0, 0}, {0, 0.1, 3}, 40);
-      camera.camera_from_world.rotation = {};
-      camera.camera_from_world.translation = {-x, 0.1, 0};
-      camera.ndc = {2 * 40.0 / kWidth, 2 * 40.0 / kHeight};
-      cameras.push_back(camera);
-    }
-  else
-    cameras = {LookingAt({2.4, 0.3, 0.5}, {0.1, -0.2, 0}, 50),
-               LookingAt({-1.9, 1.5, 0.9}, {0, -0.1, 0.1}, 60),
-               LookingAt({0.3, -0.3, 0.1}, {-0.4, 0.5, 0.3}, 30)};
-  return cameras;
+// Around the box of the splats, and one inside it.
+std::vector<Camera> PageCameras() {
+  return {LookingAt({2.4, 0.3, 0.5}, {0.1, -0.2, 0}, 50),
+          LookingAt({-1.9, 1.5, 0.9}, {0, -0.1, 0.1}, 60),
+          LookingAt({0.3, -0.3, 0.1}, {-0.4, 0.5, 0.3}, 30)};
 }
 
 StoredNetwork Style() {
@@ -102,13 +89,13 @@ JsonValue ViewJson(const Camera& camera, double weight, const RadianceField& fie
 
 enum class Layers { kNone, kResidual, kObject };
 
-// Of every fifth voxel, so that most of them stay what the network makes of them.
-StyleLayers SomeLayers(Layers kind, size_t voxels) {
+// Of every fifth splat, so that most of them stay what the network makes of them.
+StyleLayers SomeLayers(Layers kind, size_t splats) {
   StyleLayers layers;
   const auto random = [](uint64_t stream, size_t i, int c) {
     return static_cast<float>(RandomDouble(11, stream, 3 * i + static_cast<uint64_t>(c)));
   };
-  for (size_t i = 0; i < voxels; ++i) {
+  for (size_t i = 0; i < splats; ++i) {
     const bool on = i % 5 == 0;
     if (kind == Layers::kObject) {
       layers.weight.push_back(on ? random(3, i, 0) : 0);
@@ -124,18 +111,14 @@ StyleLayers SomeLayers(Layers kind, size_t voxels) {
 }
 
 void WritePages(const std::string& folder, const std::string& name, const RadianceField& field,
-                bool forward_facing, Layers kind = Layers::kNone) {
+                Layers kind) {
   PageContent content;
-  content.cameras = CamerasOf(forward_facing);
-  content.field = EncodeField(field, 0.03);
-  // Small fields would have none.
-  if (const auto coarse =
-          field.geometry->splats.on() ? std::nullopt : CoarseField(field, {.most_part = 10}))
-    content.coarse = EncodeField(*coarse, 0.03);
+  content.cameras = PageCameras();
+  content.field = EncodeField(field);
   RadianceField page = DecodeField(content.field);
   const PageRecords places = RecordsInPageOrder(content.field, *page.geometry);
   StyleLayers layers;
-  if (kind != Layers::kNone) layers = SomeLayers(kind, places.voxel.size());
+  if (kind != Layers::kNone) layers = SomeLayers(kind, places.splat.size());
   content.styles = {EncodeStyle(Style(), page, 0.5, layers, places)};
   content.styles[0].header["id"] = "a";
   content.styles[0].header["name"] = "evening";
@@ -156,13 +139,14 @@ void WritePages(const std::string& folder, const std::string& name, const Radian
   WriteJsonFile(folder + "/" + name + ".json", JsonValue(std::move(views)));
 }
 
-// In the box of SmallFrame and around it.
-RadianceField SplatsField() {
+// In the box and around it.
+RadianceField SplatsField(int64_t count, int basis, float near_clip, float fit_pixel) {
   const GridFrame box{{}, {0, 0, 0}, {0.8f, 1, 0.7f}};
-  const auto splats = testing::RandomSplats(600, 9, 5, 1.3, 0.02);
-  RadianceField field = FieldOfSplats(testing::CastSplats<float>(splats), box, 0.1f, 1 / 60.0f);
+  const auto splats = testing::RandomSplats(count, basis, 5, 1.3, 0.02);
+  RadianceField field =
+      FieldOfSplats(testing::CastSplats<float>(splats), box, near_clip, fit_pixel);
   for (int64_t i = 0; i < field.appearance.sh.size(); ++i)
-    if (i % 9 != 0) field.appearance.sh[i] *= 0.4f;
+    if (i % basis != 0) field.appearance.sh[i] *= 0.4f;
   return field;
 }
 
@@ -172,7 +156,7 @@ void WritePageOfRun(const std::string& folder, const std::string& run,
   const MadePage made = MakePage(run, {name}, {}, {});
   const StoredField stored = ReadFieldFile(run + "/field.npz");
   const WorkingViews photos = ReadWorkingViews(run + "/poses", kLongest, 0).InField(stored);
-  RadianceField page = DecodeField(EncodeField(stored.field, PageOptions{}.step));
+  RadianceField page = DecodeField(EncodeField(stored.field));
   const PageStyle style =
       EncodeStyle(ReadNetworkFile(StyleFolder(run, name) + "/network.npz"), page, 1);
   page.appearance = PadShBasis(std::move(page.appearance), 9);
@@ -242,21 +226,6 @@ void WritePath(const std::string& folder) {
   WriteJsonFile(folder + "/places.json", JsonValue(std::move(table)));
 }
 
-// A grid with empty bricks between full ones, which rays skip.
-RadianceField GridWithAHole() {
-  const RadianceField full = testing::RandomField({40, 10, 8}, 9, 0.4, 5);
-  auto geometry = std::make_shared<Geometry>();
-  geometry->frame = full.geometry->frame;
-  geometry->links.Resize(full.geometry->links.size());
-  const int64_t slab = full.geometry->frame.Vertex(1, 0, 0);
-  int32_t count = 0;
-  for (int64_t at = 0; at < geometry->links.size(); ++at) {
-    const bool empty = at >= 8 * slab && at < 32 * slab;
-    geometry->links[at] = !empty && full.geometry->links[at] >= 0 ? count++ : -1;
-  }
-  return testing::RandomValues(std::move(geometry), count, 9, 5);
-}
-
 }  // namespace
 }  // namespace regrade
 
@@ -272,16 +241,9 @@ int main(int argc, char** argv) {
     WritePageOfRun(folder, argv[2], argv[3]);
     return 0;
   }
-  const RadianceField grid = GridWithAHole();
-  WritePages(folder, "grid", grid, false);
-  WritePages(folder, "grid_residual", grid, false, Layers::kResidual);
-  RadianceField near = testing::RandomField({13, 17, 9}, 1, 0.5, 6);
-  near.near_clip = 0.2f;
-  WritePages(folder, "near_object", near, true, Layers::kObject);
-  RadianceField far = testing::RandomField({9, 8, 11}, 9, 0.3, 7);
-  testing::AddSpheres(5, 12, 0.7, 8, &far);
-  WritePages(folder, "spheres", far, false);
-  WritePages(folder, "splats", SplatsField(), false, Layers::kResidual);
+  WritePages(folder, "splats", SplatsField(600, 9, 0.1f, 1 / 60.0f), Layers::kResidual);
+  WritePages(folder, "object", SplatsField(400, 4, 0.2f, -1), Layers::kObject);
+  WritePages(folder, "few_harmonics", SplatsField(300, 1, 0.1f, 0), Layers::kNone);
   WritePath(folder);
   WriteColorMaps(folder);
   return 0;

@@ -40,9 +40,9 @@ class View {
     const high = [0, 1, 2].map((a) => Math.max(...all.map((p) => p.eye[a])));
     this.size = norm(add(high, low, -1)) || 1;
     this.fence = [low.map((v) => v - 0.25 * this.size), high.map((v) => v + 0.25 * this.size)];
-    const seen = header.ndc ? null : pointOfViews(all), ahead = header.ndc ? 4 : this.size;
+    const seen = pointOfViews(all);
     this.pivotOfHome = seen && dot(add(seen, home.eye, -1), home.forward) > 0
-        ? seen : add(home.eye, home.forward, ahead);
+        ? seen : add(home.eye, home.forward, this.size);
     this.mode = 'orbit';
     this.go(home);
     this.pivot = this.pivotOfHome;

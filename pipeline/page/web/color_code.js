@@ -1,4 +1,4 @@
-// The 27 numbers of a voxel's colours in four words, see pipeline/page/color_code.h; the same as text for shaders.
+// The 27 numbers of a splat's colours in four words, see pipeline/page/color_code.h; the same as text for shaders.
 
 const CODE_WORDS = [[0, 11, 4, 21, 14, 24, 17], [1, 18, 19, 6, 7, 16, 25], [9, 3, 12, 13, 22, 23, 26], [2, 10, 5, 20, 15, 8]];
 

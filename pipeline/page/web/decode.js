@@ -1,79 +1,64 @@
-// The field of a page as the textures that hold it; runs in a worker, or where there are none in slices.
+// The splats of a page as the textures that hold them, see pipeline/page/field_codec.h; runs in a worker, or where there are none
+// in slices.
 
-const BLOCK = 10;  // cells that share a base, logarithm; march.glsl's, too
-
-// Cells' corners as 16-bit numbers of slots, from the base of their block on. A base is as far back as a block's new slots
-// allow, at most 8 a cell; a voxel whose slot is farther back gets another one, so a few are there twice. `order`: of the
-// cells in the tree; voxel `voxels` is the empty one.
-// -> {corner: a texel a cell, base [blocks], voxel: of each slot}
-function cornersOf(corner, order, voxels) {
-  const cells = order.length, words = new Uint32Array(4 * cells), slot = new Int32Array(voxels + 1).fill(-1), base = [];
-  let voxel = new Int32Array(voxels + (voxels >> 4) + 16), count = 0, begin = 0;
-  for (let cell = 0, at = 0; cell < cells; ++cell) {
-    if ((cell & (1 << BLOCK) - 1) === 0) base.push(begin = Math.max(0, count + (8 << BLOCK) - 65536));
-    if (count + 8 > voxel.length) {
-      const longer = new Int32Array(2 * count + 16);
-      longer.set(voxel);
-      voxel = longer;
-    }
-    for (let k = 0, from = 8 * order[cell]; k < 8; k += 2, ++at)
-      for (let half = 0; half < 2; ++half) {
-        const v = corner[from + k + half];
-        if (slot[v] < begin) {
-          voxel[count] = v;
-          slot[v] = count++;
-        }
-        words[at] |= slot[v] - begin << 16 * half;
-      }
-  }
-  return {corner: words, base: Int32Array.from(base), voxel: voxel.slice(0, count)};
+// Each is predicted from up to three before it, of its own part.
+function earlierOf(count, begin = 0) {
+  const earlier = new Int32Array(3 * count).fill(-1);
+  for (let i = 0; i < count; ++i)
+    for (let k = 0, first = i < begin ? 0 : begin; k < 3 && i - k > first; ++k) earlier[3 * i + k] = i - k - 1;
+  return earlier;
 }
 
-// `text`: of the sections places, density and color. Calls progress(part).
-async function decodeVoxels(header, text, progress) {
-  const {resolution, basis} = header;
+// `text`: shape and color of the first part, or of both. Calls progress(part). -> textures mean: the mean, ln o; shape: three scales and the
+// quaternion's last three components, numbers of 16 bits; color; and the means alone, to sort
+async function decodeField(header, text, progress) {
+  const {basis, splats, center, radius} = header, {coarse} = splats, parts = text.shape.length;
   checkCode(header.color, 'color');
-  const bytes = await inflated(text.places, 'places');
-  await progress(0.05);
-  const vertices = new Vertices(bytes, resolution, header.voxels), n = vertices.count, {place} = vertices;
-  if (n !== header.voxels) throw new PageError('the page has fewer voxels than it says');
-  const earlier = vertices.earlier.subarray(0, 3 * n);
-  await progress(0.35);
-  const number = await unpackDensity(text.density, 'density', earlier);
-  let places = cellsOfGrid(vertices, resolution, number);
-  await progress(0.4);
-  places = raisedTree(places);
-  const {tree, order} = packedTree(places, (i) => i < n ? number[i] : 0);
-  await progress(0.5);
-  const {corner, base, voxel} = cornersOf(places.corner, order, n), slots = voxel.length;
-  const made = {top: places.top, finest: places.finest, voxels: n, tree, corner, base, voxel};
-  places = null;
-  await progress(0.6);
-
-  const color = made.color = new Uint32Array(4 * slots), channel = new Int16Array(n + 1), where = placesOfNumbers(header.color.bits);
-  await eachChannel(text.color, 'color', n, 3 * basis, async (k, packed) => {
-    channelNumbers(packed, earlier, channel.subarray(0, n));
-    const {word, above, unused} = where[9 * Math.floor(k / basis) + k % basis];
-    for (let s = 0, at = word; s < slots; ++s, at += 4) color[at] |= channel[voxel[s]] << unused >>> above;
-    await progress(0.6 + 0.38 * (k + 1) / (3 * basis));
-  });
-  // Places in 16 bits, for networks; the empty voxel has the highest bit.
-  made.place = new Uint32Array(2 * slots);
-  let halvings = 0;
-  while (Math.max(...resolution) >> halvings > 65535) ++halvings;
-  for (let s = 0; s < slots; ++s) {
-    const v = voxel[s];
-    made.place[2 * s] = v === n ? 0 : place[3 * v] >> halvings | place[3 * v + 1] >> halvings << 16;
-    made.place[2 * s + 1] = v === n ? 2 ** 31 : place[3 * v + 2] >> halvings;
+  const n = parts === 1 ? coarse : splats.count, ranges = [[0, coarse], [coarse, n]].slice(0, parts).filter(([a, b]) => b > a);
+  const number = Array.from({length: 10}, () => new Int16Array(n)), earlier = ranges.map(([a, b]) => earlierOf(b - a));
+  const ofPart = ([begin]) => begin === 0 && coarse > 0 ? 0 : 1;
+  for (let r = 0; r < ranges.length; ++r) {
+    const [begin, end] = ranges[r];
+    await eachChannel(text.shape[ofPart(ranges[r])], 'shape', end - begin, 10, (k, bytes) =>
+      channelNumbers(bytes, earlier[r], number[k].subarray(begin, end)));
+    await progress(0.2 * (r + 1));
   }
-  made.positionUnit = resolution.map((r) => 2 * 2 ** halvings / r);
-  made.slots = slots;
-  made.shift = 0.5;
-  made.earlier = header.residuals ? earlier.slice() : new Int32Array(0);
+  const made = {count: n, points: new Float32Array(3 * n), mean: new Uint32Array(4 * n), shape: new Uint32Array(4 * n),
+                color: new Uint32Array(4 * n), place: new Uint32Array(2 * n)};
+  const mean = new Float32Array(made.mean.buffer), most = Math.round(2 / splats.position_step), p = [0, 0, 0];
+  for (let i = 0; i < n; ++i) {
+    let farthest = 0, squared = 0;
+    for (let a = 0; a < 3; ++a) {
+      p[a] = number[a][i] * splats.position_step;
+      farthest = Math.max(farthest, Math.abs(p[a]));
+      squared += (number[6 + a][i] * splats.rotation_step) ** 2;
+    }
+    const opacity = number[9][i] * splats.opacity_step, grown = farthest <= 1 ? 1 : 1 / (2 - farthest) / farthest;
+    if (!(squared < 1 && opacity > 0 && opacity < 1 && farthest < 2)) throw damaged('shape');
+    for (let a = 0; a < 3; ++a) made.points[3 * i + a] = mean[4 * i + a] = center[a] + radius[a] * p[a] * grown;
+    mean[4 * i + 3] = Math.log(opacity);
+    const pair = (a, b) => number[a][i] & 65535 | number[b][i] << 16;
+    made.shape.set([pair(3, 4), pair(5, 6), pair(7, 8), 0], 4 * i);
+    made.place[2 * i] = number[0][i] + most | number[1][i] + most << 16;
+    made.place[2 * i + 1] = number[2][i] + most;
+  }
+  await progress(0.5);
+  const channel = new Int16Array(n), where = placesOfNumbers(header.color.bits);
+  for (let r = 0; r < ranges.length; ++r) {
+    const [begin, end] = ranges[r], own = channel.subarray(begin, end);
+    await eachChannel(text.color[ofPart(ranges[r])], 'color', end - begin, 3 * basis, async (k, bytes) => {
+      channelNumbers(bytes, earlier[r], own);
+      const {word, above, unused} = where[9 * Math.floor(k / basis) + k % basis];
+      for (let i = begin, at = 4 * begin + word; i < end; ++i, at += 4) made.color[at] |= channel[i] << unused >>> above;
+      await progress(0.5 + 0.48 * (r + (k + 1) / (3 * basis)) / ranges.length);
+    });
+  }
+  // A place is its number and `most`; a network's input is (place + shift) unit - 1.
+  made.positionUnit = [splats.position_step, splats.position_step, splats.position_step];
+  made.shift = 1 / splats.position_step - most;
+  made.earlier = header.residuals ? earlierOf(n, coarse) : new Int32Array(0);
   return made;
 }
-
-const decodeField = (header, text, progress) => (header.splats ? decodeSplats : decodeVoxels)(header, text, progress);
 
 // In a worker: a field for each message.
 function serveDecoder() {

@@ -1,4 +1,4 @@
-// The field in textures, its march and the styles' networks, on the graphics processor.
+// Textures, programs and pictures on the graphics processor.
 
 const WIDTH = 2048;  // of all textures
 
@@ -37,42 +37,19 @@ class Graphics {
   constructor(gl) {
     this.gl = gl;
     this.bytes = this.most = 0;  // of all textures and buffers, now and so far
-    this.marches = {};
     this.made = 0;  // textures so far
     // Networks run on the cores where these draw, too; '#graphics' tests the others' way.
     const name = gl.getParameter(gl.getExtension('WEBGL_debug_renderer_info')?.UNMASKED_RENDERER_WEBGL ?? gl.RENDERER);
     if (location.hash === '#cores' || location.hash !== '#graphics' && /swiftshader|llvmpipe|software/i.test(name)) this.onCores = true;
     this.floats = !!(gl.getExtension('EXT_color_buffer_float') || gl.getExtension('EXT_color_buffer_half_float'));
-    this.empty = {u: this.texture('u4', new Uint32Array(4)), i: this.texture('i1', new Int32Array(1)),
-                  p: this.texture('u2', new Uint32Array(2))};
+    this.empty = {u: this.texture('u4', new Uint32Array(4)), p: this.texture('u2', new Uint32Array(2))};
     this.array = gl.createVertexArray();
-  }
-  // The program that draws a kind of scene, with one set of colours or three: without what it has no use for, since some
-  // processors take seconds to compile.
-  marchOf({header}, count) {
-    const gl = this.gl, sets = count > 1 ? 3 : 1;
-    const parts = `#define SPHERES ${header.spheres ? 1 : 0}\n#define SETS ${sets}\n`;
-    return this.marches[parts] ??= {sets, warm: false, ...compile(gl, [
-      [gl.VERTEX_SHADER, EVERY_PIXEL], [gl.FRAGMENT_SHADER, withColors(MARCH_GLSL).replace('\n', '\n' + parts)]])};
-  }
-  // Prepares the program of another scene, or of more sets, by drawing a pixel of this one with it. False if there is nothing to do.
-  prepare(scene, view, kind, count) {
-    if (scene.draw) return false;
-    const gl = this.gl, program = this.marchOf(kind, count);
-    if (program.warm) return false;
-    const compiling = gl.getExtension('KHR_parallel_shader_compile');
-    if (compiling && !gl.getProgramParameter(program.program, compiling.COMPLETION_STATUS_KHR)) return true;
-    const target = this.target(1, 1);
-    this.draw(scene, view, [{weight: 1, colors: scene.source}], null, target, {x: 0, y: 0, width: 1, height: 1}, 1, program);
-    gl.flush();
-    target.free();
-    return true;
   }
   // 2048 texels a row, zeros; kinds: u4, u2, i1 are unsigned and signed integers of 32 bits.
   blank(kind, height) {
     const gl = this.gl;
     if (height > gl.getParameter(gl.MAX_TEXTURE_SIZE))
-      throw new PageError('this scene has more voxels than this graphics processor can hold');
+      throw new PageError('this scene has more splats than this graphics processor can hold');
     const inside = {u4: gl.RGBA32UI, u2: gl.RG32UI, i1: gl.R32I}[kind], texture = gl.createTexture();
     gl.bindTexture(gl.TEXTURE_2D, texture);
     gl.texStorage2D(gl.TEXTURE_2D, 1, inside, WIDTH, height);
@@ -106,11 +83,10 @@ class Graphics {
     this.gl.deleteTexture(texture.texture);
     this.bytes -= texture.bytes;
   }
-  // Of uniforms.
-  buffer(data) {
+  buffer(data, kind) {
     const gl = this.gl, buffer = gl.createBuffer();
-    gl.bindBuffer(gl.UNIFORM_BUFFER, buffer);
-    gl.bufferData(gl.UNIFORM_BUFFER, data, gl.STATIC_DRAW);
+    gl.bindBuffer(kind, buffer);
+    gl.bufferData(kind, data, gl.STATIC_DRAW);
     return this.taken({buffer, bytes: data.byteLength});
   }
   freeBuffer(buffer) {
@@ -159,45 +135,6 @@ class Graphics {
     gl.uniform3fv(p.at('uEye'), view.eye);
     gl.uniform4fv(p.at('uLens'), view.lens);
     gl.uniform2f(p.at('uSize'), width, height);
-  }
-
-  // `sets`: see setColors; `view`: see camera.js. Of splats, which have a draw of their own, in the order that they are in.
-  draw(scene, view, sets, map, target, strip, opacityStep, program = scene.draw ? null : this.marchOf(scene, sets.length)) {
-    if (scene.draw) return scene.draw(view, sets, map, target, strip);
-    const gl = this.gl, p = check(gl, program), h = scene.header, u = (name) => p.at(name);
-    p.warm = true;
-    gl.useProgram(p.program);
-    gl.bindVertexArray(this.array);
-    this.bind(p, 'uTree', 0, scene.tree);
-    this.bind(p, 'uCorner', 1, scene.corner);
-    this.bind(p, 'uBase', 2, scene.base);
-    this.bind(p, 'uColumn', 9, scene.column ?? this.empty.i);
-    const texel = new Float32Array(9), background = this.setColors(p, sets, map);
-    for (let i = 0; i < 3; ++i) {
-      this.bind(p, 'uTexel' + i, 10 + i, sets[i]?.colors.texel ?? this.empty.p);
-      if (sets[i]) texel.set(sets[i].colors.texelScale, 3 * i);
-    }
-    this.setView(p, view, target.width, target.height);
-    gl.uniform1fv(u('uTexelScale'), texel);
-    gl.uniform3fv(u('uBackground'), background);
-    gl.uniform2fv(u('uNdc'), h.ndc ?? [0, 0]);
-    gl.uniform3iv(u('uVoxels'), h.resolution);
-    gl.uniform3iv(u('uTop'), scene.top);
-    gl.uniform1i(u('uFinest'), scene.finest);
-    gl.uniform1i(u('uLayers'), h.spheres?.layers ?? 0);
-    gl.uniform1i(u('uResolution'), h.spheres?.resolution ?? 0);
-    gl.uniform3fv(u('uCenter'), h.center);
-    gl.uniform3fv(u('uRadius'), h.radius);
-    gl.uniform1f(u('uUnit'), scene.unit);
-    gl.uniform1f(u('uNear'), h.near);
-    gl.uniform1f(u('uStep'), h.step);
-    gl.uniform1f(u('uOpacityStep'), opacityStep);
-    gl.bindFramebuffer(gl.FRAMEBUFFER, target.framebuffer);
-    gl.viewport(0, 0, target.width, target.height);
-    gl.enable(gl.SCISSOR_TEST);
-    gl.scissor(strip.x, strip.y, strip.width, strip.height);
-    gl.drawArrays(gl.TRIANGLES, 0, 3);
-    gl.disable(gl.SCISSOR_TEST);
   }
 
   // A picture of RGBA8 to draw into.

@@ -1,4 +1,4 @@
-// A layer of a network for eight voxels at once, as a WebAssembly program that is assembled here: browsers run it on four
+// A layer of a network for eight splats at once, as a WebAssembly program that is assembled here: browsers run it on four
 // numbers an instruction. It has two functions, addresses in bytes:
 //   layer(x, y, weights, bias, inputs, blocks): y[4 blocks][8] = bias + sum over inputs of weights[block][input][4] x[input][8]
 //   sine(x, count, omega): x[count][4] = sin(omega x)

@@ -37,14 +37,14 @@ class Live {
     }
   }
   // The header of a page's style with its weights, or null. `soFar` gets those of the training; with
-  // the codes of its voxels where `needed()`.
+  // the codes of its splats where `needed()`.
   async learn(file, soFar, needed) {
     if (file.size > 32 << 20) throw new PageError('this picture is larger than 32 MB');
     const name = file.name.normalize('NFKD').replace(/[^\w.-]+/g, '_').slice(-80);
     await this.ask('POST', '/style', file, {'Regrade-Name': name});
     let seen = false;
     const peek = async (job) => {
-      // Passes over the voxels take time from the training: where codes are needed, one is enough.
+      // Passes over the splats take time from the training: where codes are needed, one is enough.
       if (job.stage !== 'stylize' || seen && needed()) return;
       const style = await this.ask('GET', '/learning').then((answer) => answer.status === 200 ? answer.json() : null).catch(() => null);
       if (!style) return;
@@ -74,7 +74,7 @@ async function learnStyle(page, file) {
   try {
     if (i >= 16) throw new PageError('this page has 16 styles; load it again');
     const soFar = (style) => page.putStyle(i, {...style, picture});
-    // The program makes a pass over the voxels faster than this page's cores.
+    // The program makes a pass over the splats faster than this page's cores.
     const style = await page.live.learn(file, soFar, () => page.graphics.onCores !== false);
     if (!style) return;
     done = true;

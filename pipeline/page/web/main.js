@@ -1,6 +1,6 @@
 // Starts the page: unpacks the scene, binds the controls, and paints.
 
-const PAGE_FORMAT = 2;
+const PAGE_FORMAT = 3;
 
 // `added`: styles that the page has learned since it was opened.
 function readHeader(added) {
@@ -9,10 +9,9 @@ function readHeader(added) {
   if (!header || typeof header !== 'object') throw new PageError('a part of the page is damaged: scene');
   if (header.format !== PAGE_FORMAT) throw new PageError('this page was made by another version of regrade');
   const numbers = (v, n) => Array.isArray(v) && v.length === n && v.every(Number.isFinite);
-  const isField = (h) => numbers(h.resolution, 3) && numbers(h.center, 3) && numbers(h.radius, 3) &&
-      h.voxels > 0 && h.voxels <= 1 << 26 && [1, 4, 9].includes(h.basis) && h.resolution.every((n) => n >= 0 && n <= 1 << 20) &&
-      (!h.splats || h.splats.coarse >= 0 && h.splats.coarse <= h.voxels && h.splats.position_step > 0);
-  if (!isField(header) || header.coarse && !isField(header.coarse) || !header.cameras?.[header.home])
+  const {splats} = header, isField = numbers(header.center, 3) && numbers(header.radius, 3) && [1, 4, 9].includes(header.basis) &&
+      splats?.count > 0 && splats.count <= 1 << 26 && splats.coarse >= 0 && splats.coarse <= splats.count && splats.position_step > 0;
+  if (!isField || !header.cameras?.[header.home])
     throw new PageError('a part of the page is damaged: scene');
   header.styles.push(...added);
   return header;
@@ -37,7 +36,7 @@ async function start(page) {
   const sayUnpacked = () => say((state.ready ? '' : styleTitle(header, 0) + ' is coming. ') +
                                     'The scene is being unpacked: ' + Math.round(100 * unpacked) + ' %');
   sayUnpacked();
-  const decoded = decodedField(header, '', true, (part) => {
+  const decoded = decodedField(header, true, (part) => {
     unpacked = part;
     if (page.round === round) sayUnpacked();
   });
@@ -45,7 +44,7 @@ async function start(page) {
   // Null: the context was lost meanwhile.
   const whole = decoded.then((made) => {
     unpacked = 1;
-    return page.round === round ? loadScene(header, made, graphics) : null;
+    return page.round === round ? new SplatScene(header, made, graphics) : null;
   });
   whole.catch(() => {});  // it is awaited below
   let scene = await loadCoarse(header, graphics) ?? await whole, painter = null;
@@ -162,9 +161,9 @@ async function start(page) {
     const full = await whole;
     for (let i = 0; i < key.weights.length; ++i) if (key.weights[i] > 0) await load(i);
     const at = Object.assign(Object.create(view), {eye: key.eye, forward: key.forward, top: key.up, half: key.half}).at(width, height);
-    await full.arrange?.(at);
+    await full.arrange(at);
     const target = graphics.target(width, height);
-    graphics.draw(full, at, setsOf(key.weights, full), state.map, target, {x: 0, y: 0, width, height}, 1 / 64);
+    full.draw(at, setsOf(key.weights, full), state.map, target, {x: 0, y: 0, width, height});
     const pixels = graphics.read(target);
     target.free();
     await wait();
@@ -242,9 +241,7 @@ async function start(page) {
         take(path.at(state.playing));
       }
     }
-    // Programs that will be wanted are made when there is nothing to draw.
-    if (!painter.step() && !graphics.prepare(scene, view.at(1, 1), {header}, 1) && header.styles.length > 0)
-      graphics.prepare(scene, view.at(1, 1), {header}, 3);
+    painter.step();
     requestAnimationFrame(run);
   };
   run();
@@ -264,11 +261,11 @@ async function start(page) {
   showReady();
   if (isStyled()) say('');
   // For tests: RGBA rows from the bottom, of any view and weights.
-  page.picture = async ({rotation, eye, lens, width, height, weights: wanted, opacityStep = 0}) => {
+  page.picture = async ({rotation, eye, lens, width, height, weights: wanted}) => {
     for (let i = 0; i < wanted.length; ++i) if (wanted[i] > 0) await load(i);
-    await scene.arrange?.({rotation, eye, lens});
+    await scene.arrange({rotation, eye, lens});
     const target = graphics.target(width, height);
-    graphics.draw(scene, {rotation, eye, lens}, setsOf(wanted), null, target, {x: 0, y: 0, width, height}, opacityStep);
+    scene.draw({rotation, eye, lens}, setsOf(wanted), null, target, {x: 0, y: 0, width, height});
     const pixels = graphics.read(target);
     target.free();
     return pixels;

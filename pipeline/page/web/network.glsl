@@ -1,24 +1,21 @@
 #version 300 es
-// A style's network on one voxel for each pixel: see EQ(liprf-network) in the C++ sources.
+// A style's network on one splat for each pixel: see EQ(liprf-network) in the C++ sources.
 precision highp float;
 precision highp int;
 precision highp usampler2D;
-precision highp isampler2D;
 
-uniform usampler2D uColor;            // a voxel's numbers, or a sphere's texel
-uniform usampler2D uPlace, uResidual; // of a strip that begins at row uRow: places of voxels, and see unpackResidual
+uniform usampler2D uColor;            // a splat's numbers
+uniform usampler2D uPlace, uResidual; // of a strip that begins at row uRow: places of splats, and see unpackResidual
 uniform int uRow;
-uniform isampler2D uPlaceOfColumn;    // of the spheres' columns
 uniform mat3 uOpponent[2];            // of the source and the style, see color_code.js
 uniform vec3 uHarmonics[54], uStepOf[18];
 uniform ivec4 uBits[14];
-uniform vec3 uSphereScale, uStyledSphereScale;
-uniform vec3 uPosition;               // the place's unit: 2 / voxels
+uniform vec3 uPosition;               // the place's unit
 uniform vec3 uConstant;               // of the colour map
 uniform mat3 uBase;
 uniform float uOmega, uPositionScale, uShift;
 uniform vec3 uResidualScale;
-uniform int uHasResidual, uActivation, uOnSpheres, uLayers, uResolution;
+uniform int uHasResidual, uActivation;
 layout(std140) uniform Layer0 { mat4 w0[128]; };
 layout(std140) uniform Layer1 { mat4 w1[256]; };
 layout(std140) uniform Layer2 { mat4 w2[256]; };
@@ -37,38 +34,20 @@ vec4 Activate(vec4 x) {
   return tanh(clamp(x, -20.0, 20.0));
 }
 
-uint Packed(vec4 code) {
-  uvec4 c = uvec4(floor(clamp(code, -127.0, 127.0) + 128.5));
-  return c.x | c.y << 8 | c.z << 16 | c.w << 24;
-}
-
 void main() {
   ivec2 at = ivec2(gl_FragCoord.xy);
   uvec4 own = texelFetch(uColor, at, 0);
   float s[32];
   for (int i = 0; i < 32; ++i) s[i] = 0.0;
-  vec3 place, q[9];
-  if (uOnSpheres == 1) {
-    for (int c = 0; c < 3; ++c) s[9 * c] = (float(own.x >> (8 * c) & 255u) - 128.0) * uSphereScale[c];
-    int column = (at.y * 2048 + at.x) / uLayers;
-    int texel = texelFetch(uPlaceOfColumn, ivec2(column & 2047, column >> 11), 0).x;
-    float longitude = (float(texel / uResolution) / float(uResolution) - 1.0) * 3.14159265358979324;
-    float latitude = (0.5 - float(texel % uResolution) / float(uResolution)) * 3.14159265358979324;
-    place = vec3(cos(latitude) * sin(longitude), sin(latitude), cos(latitude) * cos(longitude));
-  } else {
-    uvec2 p = texelFetch(uPlace, at - ivec2(0, uRow), 0).xy;
-    if (p.y >> 31 == 1u) {  // the empty voxel stays so
-      color = uvec4(0u);
-      return;
-    }
-    Unpack(own, 0, q);
-    for (int j = 0; j < 9; ++j) {
-      vec3 channels = uOpponent[0] * (q[j] * uStepOf[j]);
-      for (int k = 0; k < 9; ++k)
-        for (int c = 0; c < 3; ++c) s[9 * c + k] += uHarmonics[3 * j + k / 3][k % 3] * channels[c];
-    }
-    place = (vec3(p.x & 65535u, p.x >> 16, p.y) + uShift) * uPosition - 1.0;
+  vec3 q[9];
+  uvec2 p = texelFetch(uPlace, at - ivec2(0, uRow), 0).xy;
+  Unpack(own, 0, q);
+  for (int j = 0; j < 9; ++j) {
+    vec3 channels = uOpponent[0] * (q[j] * uStepOf[j]);
+    for (int k = 0; k < 9; ++k)
+      for (int c = 0; c < 3; ++c) s[9 * c + k] += uHarmonics[3 * j + k / 3][k % 3] * channels[c];
   }
+  vec3 place = (vec3(p.x & 65535u, p.x >> 16, p.y) + uShift) * uPosition - 1.0;
   for (int i = 0; i < 3; ++i) s[27 + i] = place[i] * uPositionScale;
 
   vec4 h[16], n[16];
@@ -116,10 +95,6 @@ void main() {
       for (int k = 1; k < 9; ++k) r[9 * c + k] *= float(added.y >> (8 * c) & 255u) / 255.0;
     }
     for (int i = 0; i < 27; ++i) r[i] = mix(s[i], r[i], weight);
-  }
-  if (uOnSpheres == 1) {
-    color = uvec4(Packed(vec4(vec3(r[0], r[9], r[18]) / uStyledSphereScale, 0.0)), own.yzw);
-    return;
   }
   for (int j = 0; j < 9; ++j) {
     vec3 channels = vec3(0.0);

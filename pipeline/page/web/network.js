@@ -1,4 +1,4 @@
-// A style: its network's weights, and the pass that sends each voxel through it.
+// A style: its network's weights, and the pass that sends each splat through it.
 
 const STRIP = 256;  // rows of a pass, at most
 const LAYERS = [[30, 64], [64, 64], [64, 64], [64, 64], [64, 64], [64, 27]];
@@ -29,45 +29,38 @@ function buffersOf(graphics, layers) {
     bias.set(own, 64 * l);
     return block;
   });
-  return [...blocks, bias].map((data) => graphics.buffer(data));
+  return [...blocks, bias].map((data) => graphics.buffer(data, graphics.gl.UNIFORM_BUFFER));
 }
 
-// Numbers of voxels of the page, `words` a voxel, as those of the scene's slots, in whole rows of texels.
-async function inSlots(scene, data, words) {
-  if (data.length !== words * scene.voxels) throw new PageError('the style that came has another number of voxels');
+// Numbers of the page's splats, `words` a splat, in whole rows of texels.
+function inRows(scene, data, words) {
+  if (data.length !== words * scene.count) throw new PageError('the style that came has another number of splats');
   const into = new Uint32Array(words * WIDTH * scene.source.color.height);
-  if (!scene.kept.voxel) {  // each is its own slot
-    into.set(data);
-    return into;
-  }
-  const voxel = await asNumbers(scene.kept.voxel);
-  for (let s = 0; s < voxel.length; ++s)
-    if (voxel[s] < scene.voxels) for (let k = 0; k < words; ++k) into[words * s + k] = data[words * voxel[s] + k];
+  into.set(data);
   return into;
 }
 
-// Colours of a style, to draw the scene with; `codes`: the words of its voxels, if they are known.
+// Colours of a style, to draw the scene with; `codes`: the words of its splats, if they are known.
 async function styleColors(graphics, scene, style, id, progress, codes = null) {
   const gl = graphics.gl;
   const layers = await loadWeights(id), buffers = buffersOf(graphics, layers);
   const names = ['Layer0', 'Layer1', 'Layer2', 'Layer3', 'Layer4', 'Layer5', 'Biases'];
   const {source} = scene, {height} = source.color;
-  const colors = {code: checkCode(style.color, id), texelScale: style.sphere_scale ?? [1, 1, 1], background: style.background};
+  const colors = {code: checkCode(style.color, id), background: style.background};
   const residual = style.residual && !codes
-      ? await inSlots(scene, await unpackResidual(textOf(id.replace('network', 'residual')), id.replace('network', 'residual'),
+      ? inRows(scene, await unpackResidual(textOf(id.replace('network', 'residual')), id.replace('network', 'residual'),
                                                   style.residual, await asNumbers(scene.kept.earlier)), 2) : null;
-  colors.color = codes ? graphics.texture('u4', await inSlots(scene, new Uint32Array(codes.buffer), 4)) : graphics.blank('u4', height);
+  colors.color = codes ? graphics.texture('u4', inRows(scene, new Uint32Array(codes.buffer), 4)) : graphics.blank('u4', height);
   const framebuffer = gl.createFramebuffer();
   const place = codes ? null : await asWords(scene.kept.place);
-  // Of what goes with the voxels no more than a strip is on the graphics processor.
+  // Of what goes with the splats no more than a strip is on the graphics processor.
   const beside = [['uPlace', place], ['uResidual', residual]].map(([name, data]) => ({name, data, texture: data && graphics.blank('u2', STRIP)}));
 
   // False if it would take long and `mayLeave` is set.
-  async function pass(target, onSpheres, from, mayLeave) {
+  async function pass(mayLeave) {
     const p = graphics.network ??= check(gl, compile(gl, [[gl.VERTEX_SHADER, EVERY_PIXEL], [gl.FRAGMENT_SHADER, withCode(NETWORK_GLSL)]]));
-    const {height} = target;
     gl.bindFramebuffer(gl.FRAMEBUFFER, framebuffer);
-    gl.framebufferTexture2D(gl.FRAMEBUFFER, gl.COLOR_ATTACHMENT0, gl.TEXTURE_2D, target.texture, 0);
+    gl.framebufferTexture2D(gl.FRAMEBUFFER, gl.COLOR_ATTACHMENT0, gl.TEXTURE_2D, colors.color.texture, 0);
     let second = 0;
     for (let y = 0, rows = 1, strips = 0; y < height; ++strips) {
       const begun = performance.now();
@@ -80,18 +73,15 @@ async function styleColors(graphics, scene, style, id, progress, codes = null) {
         gl.uniformBlockBinding(p.program, gl.getUniformBlockIndex(p.program, names[i]), i);
         gl.bindBufferBase(gl.UNIFORM_BUFFER, i, buffer.buffer);
       });
-      graphics.bind(p, 'uPlaceOfColumn', 1, scene.placeOfColumn ?? graphics.empty.i);
       beside.forEach(({name, data, texture}, i) => {
-        if (data && onSpheres !== 1) graphics.write(texture, data.subarray(2 * WIDTH * y, 2 * WIDTH * (y + rows)));
-        graphics.bind(p, name, 2 + i, texture ?? graphics.empty.p);
+        if (data) graphics.write(texture, data.subarray(2 * WIDTH * y, 2 * WIDTH * (y + rows)));
+        graphics.bind(p, name, 1 + i, texture ?? graphics.empty.p);
       });
-      graphics.bind(p, 'uColor', 0, from);
+      graphics.bind(p, 'uColor', 0, source.color);
       gl.uniform3fv(p.at('uResidualScale'), style.residual?.scale ?? [0, 0, 0]);
-      gl.uniform1i(p.at('uHasResidual'), residual && onSpheres !== 1 ? 1 : 0);
+      gl.uniform1i(p.at('uHasResidual'), residual ? 1 : 0);
       gl.uniform1i(p.at('uRow'), y);
       graphics.setCodes(p, [source.code, colors.code]);
-      gl.uniform3fv(p.at('uSphereScale'), source.texelScale);
-      gl.uniform3fv(p.at('uStyledSphereScale'), colors.texelScale);
       gl.uniform3fv(p.at('uPosition'), scene.positionUnit);
       gl.uniform3fv(p.at('uConstant'), style.constant);
       gl.uniformMatrix3fv(p.at('uBase'), true, style.base);
@@ -99,9 +89,6 @@ async function styleColors(graphics, scene, style, id, progress, codes = null) {
       gl.uniform1f(p.at('uPositionScale'), style.position_scale);
       gl.uniform1f(p.at('uShift'), scene.shift);
       gl.uniform1i(p.at('uActivation'), style.activation);
-      gl.uniform1i(p.at('uOnSpheres'), onSpheres);
-      gl.uniform1i(p.at('uLayers'), scene.header.spheres?.layers ?? 1);
-      gl.uniform1i(p.at('uResolution'), scene.header.spheres?.resolution ?? 1);
       gl.bindFramebuffer(gl.FRAMEBUFFER, framebuffer);
       gl.viewport(0, 0, WIDTH, height);
       gl.enable(gl.SCISSOR_TEST);
@@ -119,16 +106,9 @@ async function styleColors(graphics, scene, style, id, progress, codes = null) {
     }
     return true;
   }
-  const fast = !codes && (graphics.onCores !== true || !workersRun) &&
-      await pass(colors.color, 0, source.color, workersRun);
+  const fast = !codes && (graphics.onCores !== true || !workersRun) && await pass(workersRun);
   if (!codes && !scene.coarse) graphics.onCores = !fast;
   if (!codes && !fast) await restyleOnCores(graphics, scene, style, layers, {place, residual}, colors, progress);
-  if (source.texel && style.residual?.weight) {  // what is not of the object stays
-    Object.assign(colors, {texel: source.texel, texelScale: source.texelScale});
-  } else if (source.texel) {
-    colors.texel = graphics.blank('u2', source.texel.height);
-    await pass(colors.texel, 1, source.texel, false);
-  }
   gl.deleteFramebuffer(framebuffer);
   beside.forEach(({texture}) => texture && graphics.free(texture));
   buffers.forEach((buffer) => graphics.freeBuffer(buffer));

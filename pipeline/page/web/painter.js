@@ -3,7 +3,6 @@
 class Painter {
   constructor(canvas, graphics, scene, pictureOf) {
     Object.assign(this, {canvas, graphics, scene, pictureOf});
-    this.steps = {moving: 1 / 9, rest: 1 / 28};  // of opacity, a colour for each
     this.part = 0.5;        // of the canvas's side while moving
     this.rows = 16;         // of a strip
     this.changed = true;
@@ -32,21 +31,20 @@ class Painter {
     this.next = 0;
   }
   // The rectangles of a picture and the styles in each.
-  draw(target, strip, opacityStep) {
+  draw(target, strip) {
     const {view, parts} = this.pictureOf(target.width, target.height);
     for (const {from, to, sets, map} of parts) {
       const x = Math.round(from * target.width), end = Math.round(to * target.width);
       if (end > x)
-        this.graphics.draw(this.scene, view, sets, map, target,
-                           {x, y: strip.y, width: end - x, height: strip.height}, opacityStep);
+        this.scene.draw(view, sets, map, target, {x, y: strip.y, width: end - x, height: strip.height});
     }
   }
   // One step of work; false if there is none.
   step() {
     const begun = performance.now();
     // Splats are drawn in the last order that there is, until they are in that of the view.
-    const order = this.scene.orderFor?.(this.pictureOf(this.full.width, this.full.height).view, () => this.change());
-    if (order && !order.any) return true;
+    const order = this.scene.orderFor(this.pictureOf(this.full.width, this.full.height).view, () => this.change());
+    if (!order.any) return true;
     if (this.changed) {
       this.changed = false;
       const width = Math.max(16, Math.round(this.full.width * this.part));
@@ -56,7 +54,7 @@ class Painter {
         this.coarse = this.graphics.target(width, height);
       }
       this.scene.few = this.scene.slow;
-      this.draw(this.coarse, {y: 0, height}, this.steps.moving);
+      this.draw(this.coarse, {y: 0, height});
       this.scene.few = false;
       this.graphics.settle(this.coarse);
       this.graphics.show(this.coarse, this.canvas, null);
@@ -65,18 +63,18 @@ class Painter {
       // Half of a frame of 60 Hz, smoothly.
       const wanted = Math.sqrt(14 / Math.max(this.frameTime, 1));
       // Splats cost as much in a small picture: where that is slow, a few of them are drawn.
-      const least = order ? 0.35 : 0.12;
-      if (order && this.part === least && this.frameTime > 70) this.scene.slow = true;
+      const least = 0.35;
+      if (this.part === least && this.frameTime > 70) this.scene.slow = true;
       this.part = Math.max(least, Math.min(1, this.part * Math.max(0.7, Math.min(1.15, wanted))));
       this.rest = performance.now() + 120;
       return true;
     }
     if (this.next >= this.full.height) return false;
-    if (begun < this.rest || order && !order.exact) return true;
-    // Of splats each strip costs a look at all of them.
-    const height = Math.min(order ? Math.max(this.rows, this.full.height >> 1) : this.rows, this.full.height - this.next);
+    if (begun < this.rest || !order.exact) return true;
+    // Each strip costs a look at all splats.
+    const height = Math.min(Math.max(this.rows, this.full.height >> 1), this.full.height - this.next);
     const strip = {y: this.full.height - this.next - height, height};  // from the top
-    this.draw(this.full, strip, this.steps.rest);
+    this.draw(this.full, strip);
     this.graphics.settle(this.full);
     this.graphics.show(this.full, this.canvas, strip);
     this.next += height;

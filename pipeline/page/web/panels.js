@@ -155,8 +155,7 @@ function bindPath(path, state, header, place, weights, go, changed) {
 function factsOf(header, scene, graphics, painter) {
   const number = (n) => n.toLocaleString('en');
   const rows = [
-    ...header.splats ? [['Splats', number(header.voxels)]]
-        : [['Voxels', number(header.voxels)]],
+    ['Splats', number(header.splats.count)],
     ['Size of this page', (document.documentElement.innerHTML.length / 1e6).toFixed(1) + ' MB'],
     ['On the graphics processor', (graphics.bytes / 1e6).toFixed(0) + ' MB'],
     ['Picture', painter.full.width + ' x ' + painter.full.height],

@@ -5,7 +5,7 @@ precision highp float;
 precision highp int;
 precision highp usampler2D;
 
-uniform usampler2D uMean, uShape;  // see splat_decode.js
+uniform usampler2D uMean, uShape;  // see decode.js
 uniform usampler2D uColor0, uColor1, uColor2;
 //@colors
 uniform mat3 uWorldFromCamera;

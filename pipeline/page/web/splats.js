@@ -21,15 +21,15 @@ function splatPrograms(graphics, count) {
 }
 
 class SplatScene {
-  // `made`: see decodeSplats; its large parts are taken. Without points it cannot be drawn.
+  // `made`: see decodeField; its large parts are taken. Without points it cannot be drawn.
   constructor(header, made, graphics) {
-    const {voxels, slots, positionUnit, shift} = made, {gl} = graphics;
-    Object.assign(this, {header, voxels, slots, positionUnit, shift, graphics});
+    const {count, positionUnit, shift} = made, {gl} = graphics;
+    Object.assign(this, {header, count, positionUnit, shift, graphics});
     this.mean = graphics.texture('u4', made.mean);
     this.shape = graphics.texture('u4', made.shape);
     this.color = graphics.texture('u4', made.color);
     this.seen = [graphics.blank('u4', this.mean.height), graphics.blank('u4', this.mean.height)];
-    this.source = {color: this.color, code: header.color, texelScale: [1, 1, 1], background: header.background};
+    this.source = {color: this.color, code: header.color, background: header.background};
     this.kept = {place: new Blob([made.place]), earlier: new Blob([made.earlier])};
     // A texture is read when all that was drawn before is done.
     if (graphics.onCores) this.kept.color = new Blob([made.color]);
@@ -37,9 +37,8 @@ class SplatScene {
     this.order = graphics.blank('i1', this.mean.height);
     this.array = gl.createVertexArray();
     gl.bindVertexArray(this.array);
-    gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, this.corners = gl.createBuffer());
     const corners = Uint16Array.from({length: 6 * QUADS}, (_, i) => 4 * Math.floor(i / 6) + [0, 1, 2, 2, 1, 3][i % 6]);
-    gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, corners, gl.STATIC_DRAW);
+    this.corners = graphics.buffer(corners, gl.ELEMENT_ARRAY_BUFFER);
     this.framebuffer = gl.createFramebuffer();
     gl.bindFramebuffer(gl.FRAMEBUFFER, this.framebuffer);
     this.seen.forEach(({texture}, i) => gl.framebufferTexture2D(gl.FRAMEBUFFER, gl.COLOR_ATTACHMENT0 + i, gl.TEXTURE_2D, texture, 0));
@@ -50,13 +49,13 @@ class SplatScene {
     const gl = this.graphics.gl;
     this.sorter?.end();
     this.parts.forEach((texture) => this.graphics.free(texture));
-    gl.deleteBuffer(this.corners);
+    this.graphics.freeBuffer(this.corners);
     gl.deleteVertexArray(this.array);
     gl.deleteFramebuffer(this.framebuffer);
   }
   // Begins to prepare the programs for `count` sets, which takes a while: draws nothing.
   static warm(header, graphics, count) {
-    const none = new Uint32Array(4), made = {voxels: 1, slots: 1, mean: none, shape: none, color: none, place: none, earlier: none};
+    const none = new Uint32Array(4), made = {count: 1, mean: none, shape: none, color: none, place: none, earlier: none};
     const scene = new SplatScene(header, made, graphics), target = graphics.target(1, 1);
     const sets = Array.from({length: count}, () => ({weight: 1, colors: scene.source}));
     scene.draw({rotation: [1, 0, 0, 0, 1, 0, 0, 0, 1], eye: [0, 0, 0], lens: [1, 1, 0.5, 0.5]}, sets, null, target,
@@ -105,7 +104,7 @@ class SplatScene {
     gl.drawArrays(gl.TRIANGLES, 0, 3);
     return background;
   }
-  // As Graphics.draw; the scene is in order. `few`: the splats that come first alone.
+  // In the order that they are in. `sets`: see Graphics.setColors; `view`: see camera.js. `few`: the splats that come first alone.
   draw(view, sets, map, target, strip) {
     const {gl} = this.graphics, programs = splatPrograms(this.graphics, sets.length), {blend, resolve} = programs;
     for (const program of [programs.see, blend, resolve]) check(gl, program);
@@ -116,7 +115,7 @@ class SplatScene {
     this.graphics.bind(blend, 'uOrder', 2, this.order);
     const count = this.ordered?.count ?? 0;
     gl.uniform1i(blend.at('uCount'), count);
-    gl.uniform1i(blend.at('uMost'), (this.few && this.header.splats.coarse) || this.voxels);
+    gl.uniform1i(blend.at('uMost'), (this.few && this.header.splats.coarse) || this.count);
     const top = target.height - strip.y - strip.height;
     gl.uniform2f(blend.at('uSize'), target.width, target.height);
     gl.uniform4f(blend.at('uStrip'), strip.x, strip.x + strip.width, top, top + strip.height);

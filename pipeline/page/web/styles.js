@@ -5,17 +5,15 @@ class SceneStyles {
   constructor(graphics, scene, header) {
     Object.assign(this, {graphics, scene, header, colors: [], loading: []});
   }
-  // `codes`: see styleColors. A coarse scene has no voxels to which a style could add: it shows what the network alone
+  // `codes`: see styleColors. A coarse scene has not all splats to which a style could add: it shows what the network alone
   // makes of it, or nothing where the style is for an object.
   async make(i, progress, codes) {
     const scene = await this.scene, style = this.header.styles[i];
     if (!scene || scene.coarse && style.residual?.weight) return;
     this.colors[i] = await styleColors(this.graphics, scene, scene.coarse ? {...style, residual: null} : style, 'network_' + i, progress, codes);
-    this.source = scene.source;
   }
   free(set) {
-    for (const texture of [set?.color, set?.texel])
-      if (texture && texture !== this.source.texel) this.graphics.free(texture);
+    if (set) this.graphics.free(set.color);
   }
   forget(i) {
     this.free(this.colors[i]);

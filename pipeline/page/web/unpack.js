@@ -1,4 +1,4 @@
-// Bytes of the page to numbers of voxels; pipeline/page/value_codec.h says how they are packed.
+// Bytes of the page to numbers of splats; pipeline/page/value_codec.h says how they are packed.
 
 class PageError extends Error {}
 
@@ -53,28 +53,13 @@ async function eachChannel(text, id, n, channels, put) {
   if (channel !== channels || filled > 0) throw damaged(id);
 }
 
-function toHalf(value) {
-  toHalf.float[0] = Math.max(-65504, Math.min(65504, value));
-  const bits = toHalf.bits[0], sign = bits >>> 16 & 0x8000;
-  const exponent = (bits >>> 23 & 255) - 112, mantissa = bits & 0x7fffff;
-  if (exponent < -10) return sign;
-  const whole = exponent > 0 ? mantissa : (mantissa | 0x800000);
-  const shift = exponent > 0 ? 13 : 14 - exponent;
-  let half = (exponent > 0 ? exponent << 10 : 0) + (whole >>> shift);
-  const rest = whole & (1 << shift) - 1, middle = 1 << shift - 1;
-  if (rest > middle || rest === middle && half & 1) ++half;
-  return sign | half;
-}
-toHalf.float = new Float32Array(1);
-toHalf.bits = new Uint32Array(toHalf.float.buffer);
-
 function fromHalf(half) {
   const sign = half & 0x8000 ? -1 : 1, exponent = half >> 10 & 31, mantissa = half & 1023;
   return exponent === 0 ? sign * mantissa * 2 ** -24
                         : sign * (1024 + mantissa) * 2 ** (exponent - 25);
 }
 
-// Numbers of one channel, see EQ(page-prediction); `earlier` has three entries a voxel.
+// Numbers of one channel, see EQ(page-prediction); `earlier` has three entries a splat.
 function channelNumbers(bytes, earlier, into) {
   const n = into.length;
   for (let i = 0; i < n; ++i) {
@@ -88,14 +73,7 @@ function channelNumbers(bytes, earlier, into) {
   }
 }
 
-// Numbers of densities, see EQ(page-density).
-async function unpackDensity(text, id, earlier) {
-  const n = earlier.length / 3, number = new Int16Array(n);
-  await eachChannel(text, id, n, 1, (_, bytes) => channelNumbers(bytes, earlier, number));
-  return number;
-}
-
-// What a style adds voxel by voxel, see residual_codec.h: eight bytes each, three codes of colours, a weight, three view
+// What a style adds splat by splat, see residual_codec.h: eight bytes each, three codes of colours, a weight, three view
 // scales.
 async function unpackResidual(text, id, {scale, view, weight}, earlier) {
   const n = earlier.length / 3, number = new Int16Array(n), into = new Uint8Array(8 * n).fill(255), channels = [];

@@ -2,11 +2,11 @@
 
 // What a worker runs; it must not use anything outside itself. See network.glsl.
 function workerOfStyle() {
-  const X = 0, Y = 4096, FIRST = 8192;  // in floats: a layer's eight voxels, the next one's, weights and biases
+  const X = 0, Y = 4096, FIRST = 8192;  // in floats: a layer's eight splats, the next one's, weights and biases
   let task, floats, functions;
   const activations = [(x) => Math.sin(task.omega * x), (x) => Math.max(x, 0), (x) => Math.max(x, 0.01 * x),
                        (x) => 1 / (1 + Math.exp(-x)), (x) => Math.tanh(x)];
-  // As those of lanes.js, where WebAssembly is not allowed: two voxels at once, so that a weight is read once for both.
+  // As those of lanes.js, where WebAssembly is not allowed: two splats at once, so that a weight is read once for both.
   const plain = {
     layer(x, y, weights, bias, inputs, blocks) {
       [x, y, weights, bias] = [x / 4, y / 4, weights / 4, bias / 4];
@@ -92,7 +92,6 @@ function workerOfStyle() {
       for (let h = 0; h < 8 && begin + h < n; ++h) {
         const v = begin + h, source = s[h];
         color.fill(0, 4 * v, 4 * v + 4);
-        if (place[2 * v + 1] >>> 31) continue;
         for (let j = 0; j < 27; ++j) {
           const c = Math.floor(j / 9), k = j % 9;
           r[j] = floats[x + 8 * j + h] + base[3 * c] * source[k] + base[3 * c + 1] * source[9 + k] + base[3 * c + 2] * source[18 + k] +
@@ -113,7 +112,7 @@ function workerOfStyle() {
   };
 }
 
-// Fills `colors` from the source, strip by strip; `layers` as loadWeights has them; `place` and `residual` of all slots.
+// Fills `colors` from the source, strip by strip; `layers` as loadWeights has them; `place` and `residual` of all splats.
 async function restyleOnCores(graphics, scene, style, layers, {place, residual}, colors, progress) {
   const gl = graphics.gl, url = URL.createObjectURL(new Blob(['(' + workerOfStyle + ')()'], {type: 'text/javascript'}));
   const count = Math.max(1, Math.min(8, navigator.hardwareConcurrency || 2));
@@ -125,7 +124,7 @@ async function restyleOnCores(graphics, scene, style, layers, {place, residual},
     gl.bindFramebuffer(gl.FRAMEBUFFER, framebuffer);
     gl.framebufferTexture2D(gl.FRAMEBUFFER, gl.COLOR_ATTACHMENT0, gl.TEXTURE_2D, texture.texture, 0);
     gl.readPixels(0, y, WIDTH, count, gl.RGBA_INTEGER, gl.UNSIGNED_INT, data);
-    return data.subarray(0, 4 * Math.min(WIDTH * count, scene.slots - WIDTH * y)).slice();
+    return data.subarray(0, 4 * Math.min(WIDTH * count, scene.count - WIDTH * y)).slice();
   };
   const write = (texture, y, data) => {
     const texels = data.length / 4, whole = Math.floor(texels / WIDTH), rest = texels % WIDTH;
