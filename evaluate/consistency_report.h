@@ -19,12 +19,7 @@ struct PairResult {
   std::string sequence;
   int from = 0, to = 0;  // frame indices
 
-  // EQ(tc-psnr), Lai et al. 2018: e = sum_x |M(x) (O_b(x + f(x)) - O_a(x))|^2 / (C sum_x M(x)),
-  // over trusted pixels x of frame a and the C = 3 colour channels. f and M are flow from a to
-  // b and mask of the reference frames; O is sampled bilinearly with repeated border, values as
-  // given (white = 1, not clipped). b is the frame that is warped: the later one, or with
-  // `--warp earlier` the earlier one. `--error-per pixel` leaves C out: every value is 10 log10
-  // 3 = 4.77 dB lower. Empty if no pixel can be compared.
+  // e, see EQ(tc-psnr); empty if no pixel can be compared.
   std::optional<double> error;
   // -10 log10(e) in dB; +inf for identical frames; empty if `error` is.
   std::optional<double> psnr_db;

@@ -34,7 +34,8 @@ void PrintHelp() {
       "\nthe usual way:\n"
       "  regrade run PHOTOS --style PICTURE --out DIR      photos to film and report\n"
       "  regrade stylize DIR --style OTHER_PICTURE         another style of the same scene\n"
-      "\nregrade COMMAND --help has the usual options of a command, --help-all has all.\n");
+      "\nregrade COMMAND --help has the usual options of a command, --help-all has all, "
+      "--help-constants what only measurements change.\n");
 }
 
 void Dispatch(const Arguments& arguments, Console* console) {

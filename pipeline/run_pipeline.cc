@@ -33,19 +33,22 @@ struct StageEntry {
 // pipeline/run/fit_memory.h. Blocks of a larger field: pipeline/commands/refine_command.cc.
 // clang-format off
 constexpr StageEntry kStages[] = {
-    // photos -> poses/: cameras and points by COLMAP or as given (reconstruct/colmap)
+    // photos -> poses/: cameras and points by COLMAP, with the arguments of
+    // reconstruct/colmap/colmap_strategies.h, or as given
     {"pose", PoseStage},
     // poses/ -> field.npz: voxels (reconstruct/fit) or splats (reconstruct/splats) fitted to the
-    // photos, whose exposure is undone where they are read (pipeline/capture/working_views.h);
-    // the loss is in kernels/field/render_ray.h, its total variation in
+    // photos, whose exposure is undone where they are read (pipeline/capture/photo_gains.h);
+    // the loss of voxels is in kernels/field/render_ray.h, its total variation in
     // kernels/field/total_variation.h; that of splats is in kernels/image/picture_loss.h, its
     // regularizers in kernels/splats/splat_update.h, births in reconstruct/splats/population.h
     {"reconstruct", ReconstructStage},
-    // photos + style picture -> views_2d/: each photo styled in 2D (stylize/image)
+    // photos + style picture -> views_2d/: each photo styled in 2D (stylize/image) by the method
+    // that pipeline/stages/make_stylizer.h makes
     {"style_2d", Style2dStage},
     // field.npz + views_2d/ -> network.npz: a network of bounded Lipschitz constant that maps
     // the field's colours (stylize/training); its loss is in
-    // stylize/field/gradient_aggregation.h, its bound in stylize/field/lipschitz_network.h
+    // stylize/field/gradient_aggregation.h, with the regularizer of
+    // stylize/field/weight_update.h, its bound in stylize/field/lipschitz_network.h
     {"stylize", StylizeStage},
     // field.npz + network.npz -> frames/ (a pixel of splats in kernels/splats/compositing.h,
     // their colours in kernels/splats/splat_color.h, a ray through voxels in
@@ -57,7 +60,7 @@ constexpr StageEntry kStages[] = {
     {"evaluate", EvaluateStage},
     // all records -> report.json, report.html (pipeline/report); the scene -> scene.html, a
     // page to walk in (pipeline/page/make_page.h; splats in field_codec.h, styles in
-    // style_codec.h)
+    // style_codec.h; drawn by web/splats.js and web/blend_splats.glsl)
     {"report", ReportStage},
 };
 // clang-format on

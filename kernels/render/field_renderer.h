@@ -33,7 +33,7 @@ class FieldRenderer {
   }
 
  private:
-  std::unique_ptr<KindRenderer> renderer_;
+  std::unique_ptr<Renderer> renderer_;
 };
 
 }  // namespace regrade

@@ -4,7 +4,6 @@
 #include "kernels/render/splat_renderer.h"
 #include "kernels/render/splat_weigher.h"
 #include "kernels/render/voxel_renderer.h"
-#include "kernels/render/voxel_weigher.h"
 
 namespace regrade {
 

@@ -14,7 +14,7 @@ namespace {
 
 // Splats are sorted by a frame's depth and blended as they are: there is no faster picture to
 // trade for.
-class SplatRenderer : public KindRenderer {
+class SplatRenderer : public Renderer {
  public:
   explicit SplatRenderer(const RadianceField& field) : options_(SplatOptionsOf(field)) {}
 
@@ -41,7 +41,7 @@ class CpuSplatRenderer : public SplatRenderer {
     return view;
   }
 
-  RenderedPair RenderWith(const KindRenderer& other, const Camera& camera) const override {
+  RenderedPair RenderWith(const Renderer& other, const Camera& camera) const override {
     const auto& same = dynamic_cast<const CpuSplatRenderer&>(other);
     SplatFrame frame = FrameOf(camera);
     RenderedPair pair{RenderedSplats(RenderSplats(frame)), {}};
@@ -82,7 +82,7 @@ class CudaSplatRenderer : public SplatRenderer {
     return RenderedSplats(renderer_.Download());
   }
 
-  RenderedPair RenderWith(const KindRenderer& other, const Camera& camera) const override {
+  RenderedPair RenderWith(const Renderer& other, const Camera& camera) const override {
     return {Render(camera), dynamic_cast<const CudaSplatRenderer&>(other).Render(camera).color};
   }
 
@@ -93,12 +93,12 @@ class CudaSplatRenderer : public SplatRenderer {
 
 }  // namespace
 
-std::unique_ptr<KindRenderer> MakeSplatRenderer(const RadianceField& field, Backend backend) {
+std::unique_ptr<Renderer> MakeSplatRenderer(const RadianceField& field, Backend backend) {
   if (backend == Backend::kCuda) return std::make_unique<CudaSplatRenderer>(field);
   return std::make_unique<CpuSplatRenderer>(field);
 }
 
-std::unique_ptr<KindRenderer> TakeSplats(RadianceField&& field, Backend backend) {
+std::unique_ptr<Renderer> TakeSplats(RadianceField&& field, Backend backend) {
   if (backend == Backend::kCuda) return MakeSplatRenderer(field, backend);
   return std::make_unique<CpuSplatRenderer>(std::move(field));
 }

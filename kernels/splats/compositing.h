@@ -43,6 +43,11 @@ struct SplatHit {
   bool limited = false;  // alpha is 0.99
 };
 
+// EQ(splat-opacity), Kerbl et al. 2023: o = 1 / (1 + exp(-x)) of the logit x, alpha = min(0.99,
+// o rho exp(-q / 2)), left out where o rho exp(-q / 2) < 1 / 255. In logarithms, which keep all
+// digits at both ends: ln o = -log1p(exp(-|x|)) + min(x, 0), ln alpha = ln o + ln rho - q / 2,
+// d ln o / dx = 1 / (1 + exp(x)). At the limit 0.99 and beyond, d alpha = 0.
+//
 // False where the place (u, v), in pixels, does not see the splat.
 template <typename T>
 HD bool HitSplatAt(const ScreenEllipse<T>& ellipse, T log_opacity, T reach, double u, double v,

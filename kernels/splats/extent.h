@@ -1,9 +1,5 @@
-// A splat's opacity, and the part of the screen where it is seen.
-//
-// EQ(splat-opacity), Kerbl et al. 2023: o = 1 / (1 + exp(-x)) of the logit x, alpha = min(0.99,
-// o rho exp(-q / 2)), left out where o rho exp(-q / 2) < 1 / 255. In logarithms, which keep all
-// digits at both ends: ln o = -log1p(exp(-|x|)) + min(x, 0), ln alpha = ln o + ln rho - q / 2,
-// d ln o / dx = 1 / (1 + exp(x)). At the limit 0.99 and beyond, d alpha = 0.
+// A splat's opacity, see EQ(splat-opacity), and the part of the screen where
+// it is seen.
 //
 // EQ(splat-extent): seen where q = d^T S^-1 d <= Q = 2 (ln(o rho) + ln 255). The largest |d_x|
 // with q <= Q is where S^-1 d is along x, d = S e_x m: q = m^2 S_xx = Q and d_x = m S_xx, so

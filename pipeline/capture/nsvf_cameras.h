@@ -13,6 +13,11 @@
 
 namespace regrade {
 
+// The numbers of each line that has some, separated by white space or commas. Throws
+// Error(kInput) with the line: no file, more than 64 KiB, a word that is no number, a number
+// that is not finite, or no number at all.
+std::vector<std::vector<double>> ReadNumberFile(const std::string& path);
+
 // Focal lengths and principal point, in pixels of the pictures; size and pose are left out.
 // intrinsics.txt is a matrix of 3 x 3, 3 x 4 or 4 x 4 numbers, or begins with a line that
 // begins with focal length and principal point.

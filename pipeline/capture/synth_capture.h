@@ -44,7 +44,7 @@ struct SynthOptions {
          .choices = "|global|local|object|vignette"});
     bind("flow", flow,
          {.help =
-              "writes the motion between neighbouring photos, and what both see: up to eight "
+              "writes the motion between photos 1 and 5 apart, and what both see: up to eight "
               "files for each photo"});
     bind("seed", seed, {.help = "seed of textures, exposures and noise"});
   }

@@ -5,7 +5,7 @@
 
 #include "kernels/base/error.h"
 #include "pipeline/commands/command.h"
-#include "pipeline/program/question.h"
+#include "pipeline/program/console.h"
 #include "pipeline/workspace/folder_size.h"
 #include "pipeline/workspace/output_names.h"
 #include "pipeline/workspace/style_folders.h"

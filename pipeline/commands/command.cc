@@ -15,8 +15,8 @@
 #include "kernels/base/error.h"
 #include "pipeline/capture/capture_store.h"
 #include "pipeline/files/text.h"
+#include "pipeline/program/console.h"
 #include "pipeline/program/device_choice.h"
-#include "pipeline/program/question.h"
 #include "pipeline/run/resolve_settings.h"
 #include "pipeline/run/run_file.h"
 #include "pipeline/workspace/style_folders.h"
@@ -64,7 +64,8 @@ Arguments WordsOf(const char* text) {
   return words;
 }
 
-void PrintHelp(const Command& command, const Arguments& arguments, const OptionSet& options) {
+void PrintHelp(const Command& command, const Arguments& arguments, bool continues,
+               const OptionSet& options) {
   const std::vector<std::string> required = RequiredOptions(command.usage);
   if (HasFlag(arguments, kHelpMan)) {
     std::printf("%s", options.ManPage(required).c_str());
@@ -74,8 +75,11 @@ void PrintHelp(const Command& command, const Arguments& arguments, const OptionS
     std::printf("regrade %s %s\n%s\n", command.name, command.usage, command.summary);
     const Arguments shown = WordsOf(command.shown);
     if (HasFlag(arguments, kHelpConstants)) {
-      std::printf("What --config alone changes, for measurements:\n%s",
-                  options.HelpOfConstants().c_str());
+      const std::string constants = options.HelpOfConstants();
+      std::printf("%s\n%s",
+                  constants.empty() ? "There is nothing that --config alone changes."
+                                    : "What --config alone changes, for measurements:",
+                  constants.c_str());
       return;
     }
     const bool all = HasFlag(arguments, "--help-all") || shown.empty();
@@ -86,6 +90,10 @@ void PrintHelp(const Command& command, const Arguments& arguments, const OptionS
                   options.count());
     else if (!shown.empty())
       std::printf("\n--no-NAME turns off a switch that is on.\n");
+    if (continues)
+      std::printf(
+          "\nWhat is not given is as in run.json of DIR; what its poses and its fit need stays "
+          "so.\n");
   }
 }
 
@@ -141,7 +149,10 @@ std::optional<Prepared> Prepare(const Command& command, const Arguments& argumen
   sources.taken = preparation.taken;
   if (AsksForHelp(arguments)) {
     ResolveSettings(sources, options);
-    PrintHelp(command, arguments, *options);
+    PrintHelp(
+        command, arguments,
+        preparation.taken.empty() && (preparation.continues_run || preparation.continues_style),
+        *options);
     return std::nullopt;
   }
   Prepared prepared;
@@ -153,6 +164,9 @@ std::optional<Prepared> Prepare(const Command& command, const Arguments& argumen
   };
   if (preparation.continues_run || preparation.continues_style) {
     check_words();
+    if (preparation.taken.empty() && options->Given("out"))
+      throw UsageError("the folder that is continued has all that is made", "--out",
+                       "leave it out, or copy the folder first");
     const std::string& folder = prepared.words[0];
     if (!Workspace::Exists(folder))
       throw InputError("no run has worked in this folder", folder,
@@ -179,6 +193,13 @@ std::optional<Prepared> Prepare(const Command& command, const Arguments& argumen
 
 void RequireValue(const std::string& value, const char* flag, const char* hint) {
   if (value.empty()) throw UsageError("its value is missing", flag, hint);
+}
+
+void RefuseRequirements(const OptionSet& options) {
+  for (const char* name : {"require", "junit"})
+    if (options.Given(name))
+      throw UsageError("nothing is measured here", std::string("--") + name,
+                       "give it to `regrade run`, `stylize`, `render` or `evaluate`");
 }
 
 Capture ReadPosedCapture(const std::string& folder) {

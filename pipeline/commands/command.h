@@ -66,6 +66,9 @@ void CheckWords(const Command& command, const Arguments& words, size_t least, si
 // Throws Error(kUsage) for an empty value of a flag that must have one.
 void RequireValue(const std::string& value, const char* flag, const char* hint);
 
+// Of commands that measure nothing. Throws Error(kUsage) for --require and --junit.
+void RefuseRequirements(const OptionSet& options);
+
 // The poses and photos of an output folder. Throws Error(kInput) if it has none.
 Capture ReadPosedCapture(const std::string& folder);
 

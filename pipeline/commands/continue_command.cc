@@ -43,6 +43,7 @@ void ContinueStyle(const Command& command, const Arguments& arguments, const std
                      "name it with --name");
   if (context.parts.One()) {
     ParsePart(context.parts.part);
+    RefuseRequirements(context.options);
     if (!settings.start.restart_from.empty())
       throw UsageError("goes without --part", "--restart-from",
                        "remove parts/ of the style's folder to render parts again");

@@ -48,8 +48,8 @@ void RunEvaluate(const Command& command, const Arguments& words, Console* consol
   ConsistencyOptions consistency;
   ProgramOptions program;
   OptionSet options;
-  options.Add("Frames", &frames);
-  options.Add("Splats", &splats);
+  options.Add("Of --frames and --splats", &frames);
+  options.Add("Of --splats", &splats);
   options.Add("Evaluation", &consistency);
   options.Add("Program", &program);
   // Without these it evaluates the folder of a run, with all of a run's options.

@@ -42,8 +42,9 @@ struct FramesOptions {
                   ".npy of height x width, along the optical axis in the unit of --cameras"});
     // Stands for other options, which ExpandProtocol() puts in its place.
     bind("protocol", protocol,
-         {.help = "a published protocol by name, also for runs: sets --mode, --gaps and "
-                  "--warp where it says so, and refuses others; geometry of frames needs "
+         {.help = "a published protocol by name, also for runs: sets --mode, --gaps, "
+                  "--warp and --error-per where it says so, and refuses other values; geometry "
+                  "of frames needs "
                   "--cameras and --depth; evaluate/PROTOCOLS.md defines each",
           .choices = ProtocolChoices()});
     bind("format", format,

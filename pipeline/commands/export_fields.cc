@@ -117,6 +117,8 @@ void ExportFields(const ExportOptions& options, const std::string& folder, Conso
   std::vector<std::string> left;
   const std::vector<std::string> styles = WantedStyles(folder, words, &left);
   if (!left.empty()) console->Info(LeftOutText(folder, left));
+  const bool splats = CountSplats(folder + "/field.npz") > 0;
+  CheckSuits(options, splats);
   if (options.dry_run) {
     console->Info(Concat(options.names.empty() ? "the field and " : "",
                          Counted(std::ssize(styles), "style"), " would be written to ",
@@ -124,8 +126,6 @@ void ExportFields(const ExportOptions& options, const std::string& folder, Conso
     return;
   }
   StoredField field = ReadFieldFile(folder + "/field.npz");
-  const bool splats = field.field.geometry->splats.on();
-  CheckSuits(options, splats);
   MakeEmptyFolder(options.out, "");
   std::optional<VoxelsAsSplats> fitted;
   if (IsSplatExport(options.format) && !splats) fitted.emplace(folder, options, field, console);

@@ -25,29 +25,35 @@ struct SplatExport {
   const char *format, *ending;
   bool turned;  // to right, up and back
   bool exact;   // holds floats
+  void (*write)(const std::string& path, const StoredField& stored);
 };
-constexpr SplatExport kSplatExports[] = {{"ply", ".ply", false, true},
-                                         {"spz", ".spz", true, false},
-                                         {"glb", ".glb", true, true},
-                                         {"compressed-ply", ".compressed.ply", false, false}};
+
+bool IsAntialiased(const StoredField& stored) {
+  return stored.field.geometry->splats.fit_pixel == 0;
+}
+
+constexpr SplatExport kSplatExports[] = {
+    {"ply", ".ply", false, true,
+     [](const std::string& path, const StoredField& stored) {
+       WriteSplatPly(path, stored, kComment);
+     }},
+    {"spz", ".spz", true, false,
+     [](const std::string& path, const StoredField& stored) {
+       WriteSpz(path, WorldSplats(stored), IsAntialiased(stored));
+     }},
+    {"glb", ".glb", true, true,
+     [](const std::string& path, const StoredField& stored) {
+       WriteSplatGlb(path, WorldSplats(stored));
+     }},
+    {"compressed-ply", ".compressed.ply", false, false,
+     [](const std::string& path, const StoredField& stored) {
+       WriteCompressedPly(path, WorldSplats(stored), IsAntialiased(stored), kComment);
+     }}};
 
 const SplatExport* FindExport(const std::string& format) {
   for (const SplatExport& known : kSplatExports)
     if (format == known.format) return &known;
   return nullptr;
-}
-
-void WriteSplats(const std::string& format, const std::string& path,
-                 const StoredField& stored) {
-  const bool antialiased = stored.field.geometry->splats.fit_pixel == 0;
-  if (format == "ply")
-    WriteSplatPly(path, stored, kComment);
-  else if (format == "spz")
-    WriteSpz(path, WorldSplats(stored), antialiased);
-  else if (format == "glb")
-    WriteSplatGlb(path, WorldSplats(stored));
-  else
-    WriteCompressedPly(path, WorldSplats(stored), antialiased, kComment);
 }
 
 // What a reader of `path` renders in place of `stored`.
@@ -67,7 +73,7 @@ void ExportSplats(const ExportOptions& options, const std::string& folder,
                   const std::string& name, const StoredField& stored, Console* console) {
   const SplatExport& format = *FindExport(options.format);
   const std::string to = options.out + "/" + name + format.ending;
-  WriteSplats(options.format, to, stored);
+  format.write(to, stored);
   const int64_t count = stored.field.geometry->num_voxels();
   std::string text = Concat("wrote ", to, ": ", count, " splats of ",
                             Format("%.1f", static_cast<double>(std::filesystem::file_size(to)) /

@@ -28,7 +28,7 @@ void RunPage(const Command& command, const Arguments& arguments, Console* consol
   ProgramOptions program;
   OptionSet options;
   options.Add("Page", &file);
-  options.Add("Page's size", &page);
+  options.Add("Page", &page);
   options.Add("Program", &program);
   const auto prepared =
       Prepare(command, arguments, {.most_words = 1 + kMostPageStyles}, &options);

@@ -129,6 +129,7 @@ void RunRefine(const Command& command, const Arguments& arguments, Console* cons
   context.settings.Bind(&context.options);
   const auto prepared = Prepare(command, arguments, {.continues_run = true}, &context.options);
   if (!prepared) return;
+  RefuseRequirements(context.options);
   RunSettings& settings = context.settings;
   const RefineOptions& refine = context.refine;
   if (refine.One()) ParsePart(refine.part);

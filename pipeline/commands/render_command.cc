@@ -6,7 +6,7 @@
 #include "kernels/render/field_renderer.h"
 #include "pipeline/capture/working_views.h"
 #include "pipeline/commands/continue_command.h"
-#include "pipeline/fields/seen_field.h"
+#include "pipeline/fields/field_file.h"
 #include "pipeline/files/text.h"
 #include "pipeline/images/still_file.h"
 #include "pipeline/program/device_choice.h"
@@ -173,6 +173,7 @@ void RunRender(const Command& command, const Arguments& arguments, Console* cons
   settings.Bind(&options);
   const auto prepared = Prepare(command, arguments, {.continues_style = true}, &options);
   if (!prepared) return;
+  RefuseRequirements(options);
   if (!parts.part.empty()) throw UsageError("goes without --part", "--photo");
   const std::string& folder = prepared->words[0];
   const std::string name = ChosenLearnedStyle(folder, options.Given("name").value_or(""));

@@ -18,7 +18,7 @@
 #include "pipeline/program/device_choice.h"
 #include "pipeline/stages/film_frames.h"
 #include "pipeline/stages/foreign_splats.h"
-#include "pipeline/stages/placed_cameras.h"
+#include "pipeline/stages/splat_views.h"
 #include "pipeline/workspace/output_names.h"
 
 namespace regrade {

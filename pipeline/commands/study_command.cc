@@ -17,7 +17,9 @@ struct StudyFileOptions {
   template <typename Bind>
   void Describe(Bind& bind) {
     bind("out", out,
-         {.help = "the page to write; of answers a JSON file of their analysis, if wanted"});
+         {.help =
+              "the page to write; of answers, where it may be left out, a JSON file of their "
+              "analysis"});
   }
 };
 

@@ -285,6 +285,7 @@ void RunTradeoff(const Command& command, const Arguments& arguments, Console* co
   const auto prepared = Prepare(command, arguments,
                                 {.least_words = 1, .most_words = 1, .preset = "draft"}, &flags);
   if (!prepared) return;
+  RefuseRequirements(flags);
   const Arguments& words = prepared->words;
   CheckOptions(settings, tradeoff);
   CheckTogether(settings);

@@ -10,6 +10,7 @@
 #include <cstdlib>
 #include <cstring>
 #include <ctime>
+#include <iostream>
 
 #include "kernels/base/clock.h"
 #include "kernels/base/error.h"
@@ -197,6 +198,15 @@ void Console::DrawLine(const Progress& progress, std::optional<double> left, dou
 void Console::Erase() {
   if (line_drawn_) Put(stderr, "\r\033[K");
   line_drawn_ = false;
+}
+
+bool CanAsk() { return ::isatty(STDIN_FILENO) == 1 && ::isatty(STDERR_FILENO) == 1; }
+
+bool AnsweredYes(const std::string& question) {
+  std::cerr << question << " [y/N] " << std::flush;
+  std::string answer;
+  std::getline(std::cin, answer);
+  return answer == "y" || answer == "Y" || answer == "yes";
 }
 
 }  // namespace regrade

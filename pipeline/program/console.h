@@ -79,4 +79,10 @@ class Console {
   double begin_, stage_begin_, last_drawn_;  // of ClockSeconds()
 };
 
+// Is there a terminal to ask on and to answer from?
+bool CanAsk();
+
+// "QUESTION [y/N]" on stderr; true for a yes. No answer is a no.
+bool AnsweredYes(const std::string& question);
+
 }  // namespace regrade

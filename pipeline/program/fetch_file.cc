@@ -1,6 +1,7 @@
 #include "pipeline/program/fetch_file.h"
 
 #include <curl/curl.h>
+#include <openssl/evp.h>
 
 #include <memory>
 
@@ -117,5 +118,15 @@ std::string FetchFile(const std::string& address, const FetchRules& rules) {
 }
 
 std::string FetchLibrary() { return curl_version_info(CURLVERSION_NOW)->version; }
+
+std::string Sha256(std::string_view bytes) {
+  unsigned char digest[EVP_MAX_MD_SIZE];
+  unsigned size = 0;
+  REGRADE_CHECK(EVP_Digest(bytes.data(), bytes.size(), digest, &size, EVP_sha256(), nullptr) ==
+                1);
+  std::string text;
+  for (unsigned i = 0; i < size; ++i) text += Format("%02x", digest[i]);
+  return text;
+}
 
 }  // namespace regrade

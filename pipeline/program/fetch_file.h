@@ -3,8 +3,13 @@
 
 #include <cstdint>
 #include <string>
+#include <string_view>
 
 namespace regrade {
+
+// 64 lower-case hexadecimal digits, by which a fetched file is known to be the one that was
+// meant.
+std::string Sha256(std::string_view bytes);
 
 struct FetchRules {
   uint64_t most_bytes = 1 << 20;

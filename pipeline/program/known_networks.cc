@@ -8,7 +8,7 @@
 #include "pipeline/files/atomic_file.h"
 #include "pipeline/files/text.h"
 #include "pipeline/program/convert_pca_kd.h"
-#include "pipeline/program/sha256.h"
+#include "pipeline/program/fetch_file.h"
 
 namespace regrade {
 namespace {

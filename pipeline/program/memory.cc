@@ -11,7 +11,7 @@ namespace regrade {
 namespace {
 
 // The number after "Name:", in kB, as bytes.
-uint64_t Entry(const std::string& line, const std::string& name) {
+uint64_t MemoryEntry(const std::string& line, const std::string& name) {
   if (!line.starts_with(name)) return 0;
   const size_t digits = line.find_first_of("0123456789");
   uint64_t kilobytes = 0;
@@ -35,8 +35,8 @@ MemoryStatus ReadMemoryStatus() {
   MemoryStatus status;
   std::ifstream file("/proc/meminfo");
   for (std::string line; std::getline(file, line);) {
-    status.total += Entry(line, "MemTotal:");
-    status.available += Entry(line, "MemAvailable:");
+    status.total += MemoryEntry(line, "MemTotal:");
+    status.available += MemoryEntry(line, "MemAvailable:");
   }
   const auto limit = [&status](uint64_t total, uint64_t used) {
     if (total == 0 || (status.total > 0 && total >= status.total)) return;

@@ -39,6 +39,33 @@ const char* MemoryOf(const FitPlace& place) {
 
 }  // namespace
 
+bool LowerToMemory(const std::function<StagePlan(const FitOptions&)>& plan_of, uint64_t limit,
+                   FitOptions* options) {
+  bool lowered = false;
+  while (limit > 0 && plan_of(*options).memory > limit) {
+    auto& sides = options->resolutions;
+    const int finest = *std::ranges::max_element(sides);
+    if (finest <= kLeastResolution) break;
+    const int lower = std::max(kLeastResolution, finest - std::max(1, finest / 16));
+    for (auto* other : {&options->resolutions_y, &options->resolutions_z})
+      for (size_t s = 0; s < other->size(); ++s)
+        if (sides[s] > lower) (*other)[s] = std::max(2, (*other)[s] * lower / sides[s]);
+    for (int& side : sides) side = std::min(side, lower);
+    lowered = true;
+  }
+  return lowered;
+}
+
+bool LowerSplatsToMemory(const std::function<StagePlan(const SplatFitOptions&)>& plan_of,
+                         uint64_t limit, SplatFitOptions* options) {
+  bool lowered = false;
+  while (limit > 0 && options->thousands > kLeastSplats && plan_of(*options).memory > limit) {
+    options->thousands = std::max(kLeastSplats, std::floor(0.9f * options->thousands));
+    lowered = true;
+  }
+  return lowered;
+}
+
 StagePlan PlanSplatsAt(const FitPlace& place, const SplatFitOptions& of_fit) {
   SplatFitOptions options = of_fit;
   options.thousands += static_cast<float>(place.frozen_splats) / 1000;

@@ -36,6 +36,17 @@ int64_t OnePhotoIn(const FitPlace& place,
 // "one photo in 3 is fitted, 117 of 350, to fit into --max-memory"
 std::string FewerPhotosText(int64_t one_in, int64_t fitted, const FitPlace& place);
 
+// Lowers the resolutions of the finest stages, to no less than kLeastResolution, until the plan
+// takes at most `limit` bytes. Returns false if nothing was lowered. Half the voxels cost about
+// 1 dB.
+inline constexpr int kLeastResolution = 64;
+bool LowerToMemory(const std::function<StagePlan(const FitOptions&)>& plan_of, uint64_t limit,
+                   FitOptions* options);
+// Lowers the most splats, to no less than kLeastSplats thousands, as LowerToMemory does.
+inline constexpr float kLeastSplats = 5;
+bool LowerSplatsToMemory(const std::function<StagePlan(const SplatFitOptions&)>& plan_of,
+                         uint64_t limit, SplatFitOptions* options);
+
 struct PlannedFit {
   FitOptions options;
   StagePlan plan;

@@ -155,16 +155,6 @@ StagePlan PlanSplatFitOnDevice(const SplatFitOptions& options, int64_t photo_pix
       SplatSeconds(options, photo_pixels, photos, kOfPixel, kOfSplat)};
 }
 
-bool LowerSplatsToMemory(const std::function<StagePlan(const SplatFitOptions&)>& plan_of,
-                         uint64_t limit, SplatFitOptions* options) {
-  bool lowered = false;
-  while (limit > 0 && options->thousands > kLeastSplats && plan_of(*options).memory > limit) {
-    options->thousands = std::max(kLeastSplats, std::floor(0.9f * options->thousands));
-    lowered = true;
-  }
-  return lowered;
-}
-
 StagePlan PlanPoses(int64_t photos, int threads) {
   return {0, SecondsWith(kPoseSecondsPerPhoto * static_cast<double>(photos), threads)};
 }
@@ -215,23 +205,6 @@ void CheckFitsMemory(const StagePlan& plan, uint64_t limit, const char* memory) 
                           MemoryText(static_cast<double>(plan.memory)) + " of " + memory +
                           ", the limit is " + MemoryText(static_cast<double>(limit)),
                       "reconstruct", "use --preset draft");
-}
-
-bool LowerToMemory(const std::function<StagePlan(const FitOptions&)>& plan_of, uint64_t limit,
-                   FitOptions* options) {
-  bool lowered = false;
-  while (limit > 0 && plan_of(*options).memory > limit) {
-    auto& sides = options->resolutions;
-    const int finest = *std::ranges::max_element(sides);
-    if (finest <= kLeastResolution) break;
-    const int lower = std::max(kLeastResolution, finest - std::max(1, finest / 16));
-    for (auto* other : {&options->resolutions_y, &options->resolutions_z})
-      for (size_t s = 0; s < other->size(); ++s)
-        if (sides[s] > lower) (*other)[s] = std::max(2, (*other)[s] * lower / sides[s]);
-    for (int& side : sides) side = std::min(side, lower);
-    lowered = true;
-  }
-  return lowered;
 }
 
 }  // namespace regrade

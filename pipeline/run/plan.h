@@ -52,10 +52,6 @@ StagePlan PlanSplatFit(const SplatFitOptions& options, int64_t photo_pixels, int
                        int threads, bool one_by_one = false);
 StagePlan PlanSplatFitOnDevice(const SplatFitOptions& options, int64_t photo_pixels,
                                int64_t photos);
-// Lowers the most splats, to no less than kLeastSplats thousands, as LowerToMemory does.
-inline constexpr float kLeastSplats = 5;
-bool LowerSplatsToMemory(const std::function<StagePlan(const SplatFitOptions&)>& plan_of,
-                         uint64_t limit, SplatFitOptions* options);
 StagePlan PlanPoses(int64_t photos, int threads);
 StagePlan PlanTracks(int64_t photos, int threads);
 // What a fit stores: records of voxels or splats, and the vertices of the grid that links to
@@ -82,12 +78,5 @@ uint64_t PlannedMemory(double max_memory_gb, uint64_t available);
 // Throws Error(kResources), naming the options to lower, if the plan of a fit takes more than
 // `limit` bytes of `memory` ("memory", "GPU memory"). A limit of 0 is unknown and not checked.
 void CheckFitsMemory(const StagePlan& plan, uint64_t limit, const char* memory = "memory");
-
-// Lowers the resolutions of the finest stages, to no less than kLeastResolution, until the plan
-// takes at most `limit` bytes. Returns false if nothing was lowered. Half the voxels cost about
-// 1 dB.
-inline constexpr int kLeastResolution = 64;
-bool LowerToMemory(const std::function<StagePlan(const FitOptions&)>& plan_of, uint64_t limit,
-                   FitOptions* options);
 
 }  // namespace regrade

@@ -26,12 +26,13 @@ struct SettingsSources {
 // Writes the options that are bound in `options`, whose flags have been parsed. Later sources
 // override earlier ones:
 //   1. the preset: that of the run.json, or else of `sources`
-//   2. `sources.run_json`, without options of one start, then the file of --config
+//   2. `sources.run_json`, without options of one start, then a run.json of --config
 //   3. --preset, for the options that presets set
-//   4. paper-config, with the preset paper, for what it decides
+//   4. paper-config of --config, with the preset paper, for what it decides
 //   5. --recipe, for all options of the style network
-//   6. single flags
-//   7. "reproducible" with the device "cuda": exact sums of the fit and the style
+//   6. single options of --config
+//   7. flags
+//   8. "reproducible" with the device "cuda": exact sums of the fit and the style
 // Options of presets and recipes that are not in the set are skipped. Returns the arguments of
 // `sources.run_json`, or else of --config. Throws Error(kUsage).
 std::vector<std::string> ResolveSettings(const SettingsSources& sources, OptionSet* options);

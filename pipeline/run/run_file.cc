@@ -73,6 +73,51 @@ RunFile RunFileOf(const JsonValue& value) {
   return file;
 }
 
+// In place of the output folder, so that paths within it hold when it is moved: at the
+// beginning of a text, or behind the first ':' of one such as layers:DIR.
+constexpr char kOutMark[] = "{out}";
+
+JsonValue WithFolder(const JsonValue& value, const std::string& from, const std::string& to) {
+  if (value.IsArray()) {
+    JsonValue::Array values;
+    for (const JsonValue& part : value.AsArray()) values.push_back(WithFolder(part, from, to));
+    return values;
+  }
+  if (!value.IsString()) return value;
+  const std::string& text = value.AsString();
+  const size_t colon = text.find(':');
+  for (const size_t at : {size_t{0}, colon == std::string::npos ? 0 : colon + 1})
+    if (text.compare(at, from.size() + 1, from + "/") == 0)
+      return text.substr(0, at) + to + text.substr(at + from.size());
+  return value;
+}
+
+JsonValue::Object OptionsWithFolder(const JsonValue& options, const std::string& from,
+                                    const std::string& to) {
+  JsonValue::Object replaced;
+  for (const auto& [name, value] : options.AsObject())
+    replaced.emplace_back(name, WithFolder(value, from, to));
+  return replaced;
+}
+
+// The output folder that a run.json lies in, or else that of the run.
+std::string OutputFolderOf(const std::string& path, const JsonValue& options) {
+  namespace fs = std::filesystem;
+  std::error_code error;
+  fs::path folder = fs::absolute(path, error).lexically_normal().parent_path();
+  if (folder.parent_path().filename() == "styles") folder = folder.parent_path().parent_path();
+  if (fs::exists(folder / ".regrade", error)) return folder.string();
+  const JsonValue* const out = options.Find("out");
+  return out != nullptr && out->IsString() ? out->AsString() : folder.string();
+}
+
+RunFile InItsFolder(RunFile file, const std::string& path) {
+  if (file.options.IsObject())
+    file.options =
+        OptionsWithFolder(file.options, kOutMark, OutputFolderOf(path, file.options));
+  return file;
+}
+
 // What `read` returns, and its errors as of usage.
 template <typename Read>
 auto FromUser(const std::string& name, const Read& read) {
@@ -88,8 +133,9 @@ auto FromUser(const std::string& name, const Read& read) {
 }  // namespace
 
 RunFile ReadRunFile(const std::string& path) {
-  return FromUser(path,
-                  [&] { return RunFileOf(ReadJsonFile(path, kMaxRunFile, ExitCode::kUsage)); });
+  return FromUser(path, [&] {
+    return InItsFolder(RunFileOf(ReadJsonFile(path, kMaxRunFile, ExitCode::kUsage)), path);
+  });
 }
 
 ConfigFile ReadConfig(const std::string& text) {
@@ -101,7 +147,7 @@ ConfigFile ReadConfig(const std::string& text) {
     const bool of_options =
         value.IsObject() && value.Find("schema") == nullptr && value.Find("options") == nullptr;
     if (of_options) return {false, {{}, value}, name};
-    return {true, RunFileOf(value), name};
+    return {true, is_file ? InItsFolder(RunFileOf(value), name) : RunFileOf(value), name};
   });
 }
 
@@ -138,6 +184,7 @@ JsonValue RunFileJson(const std::string& command, const RunContext& context) {
   JsonValue kept = JsonValue::Object(), set_by = JsonValue::Object();
   for (const auto& [name, value] : options.AsObject())
     if (stays(name)) kept[name] = value;
+  kept = OptionsWithFolder(kept, context.settings.run.out, kOutMark);
   const JsonValue setters = context.options.Setters();
   for (const auto& [name, by] : setters.AsObject())
     if (stays(name)) set_by[name] = by;

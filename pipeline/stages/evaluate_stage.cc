@@ -27,7 +27,6 @@
 #include "pipeline/run/paper_config.h"
 #include "pipeline/run/run_context.h"
 #include "pipeline/stages/carried_edit.h"
-#include "pipeline/stages/control_ceiling.h"
 #include "pipeline/stages/control_field.h"
 #include "pipeline/stages/control_sequences.h"
 #include "pipeline/stages/film_frames.h"
@@ -39,7 +38,6 @@
 #include "pipeline/stages/stages.h"
 #include "pipeline/stages/style_pictures.h"
 #include "pipeline/stages/styled_field.h"
-#include "pipeline/stages/view_controls.h"
 #include "pipeline/workspace/metrics_json.h"
 #include "pipeline/workspace/output_names.h"
 

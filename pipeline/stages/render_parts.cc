@@ -10,8 +10,8 @@
 
 #include "evaluate/seen_by_few.h"
 #include "kernels/base/error.h"
+#include "pipeline/fields/field_file.h"
 #include "pipeline/fields/film_timing.h"
-#include "pipeline/fields/seen_field.h"
 #include "pipeline/files/atomic_file.h"
 #include "pipeline/files/npz_file.h"
 #include "pipeline/files/text.h"

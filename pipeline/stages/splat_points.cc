@@ -9,7 +9,7 @@
 #include "kernels/base/error.h"
 #include "kernels/splats/splat_color.h"
 #include "kernels/splats/splat_field.h"
-#include "pipeline/stages/placed_cameras.h"
+#include "pipeline/stages/splat_views.h"
 #include "reconstruct/colmap/colmap_model.h"
 #include "reconstruct/views/splat_extent.h"
 

@@ -45,7 +45,7 @@ struct PoseOptions {
         "pose-all-pairs-up-to", all_pairs_up_to,
         {.unit = "photos",
          .help = "match all pairs of up to this many photos; with more photos, match each with "
-                 "its neighbours in the order of names",
+                 "its neighbours in the order of names, above 150 also by GPS or likeness",
          .min = 2,
          .max = 10000,
          .constant = true});

@@ -12,6 +12,10 @@
 
 namespace regrade {
 
+// Indices y W + x, ascending, of `photo` (3 channels, sRGB): without the masked pixels, which
+// have a non-finite value.
+std::vector<int32_t> DrawnPixels(const Image& photo);
+
 // `photo` has the camera's size, 3 channels, sRGB. Pixels with a non-finite value are masked:
 // no ray is drawn there. Cameras are in the field's frame.
 struct TrainingView {

@@ -4,10 +4,10 @@
 #include <cmath>
 #include <numeric>
 
+#include "kernels/base/error.h"
 #include "kernels/base/random.h"
 #include "kernels/base/random_streams.h"
 #include "kernels/splats/splat_update.h"
-#include "reconstruct/splats/relocation.h"
 
 namespace regrade {
 namespace {
@@ -84,6 +84,18 @@ PopulationChange Behind(int64_t before, PopulationChange change) {
   for (SplatCopy& copy : change.copies) copy.from += by, copy.to += by;
   change.count += before;
   return change;
+}
+
+SplatCopies CopiesOf(double opacity, int copies) {
+  REGRADE_CHECK(opacity > 0 && opacity < 1 && copies >= 1 && copies <= kMostCopies);
+  const double each = -std::expm1(std::log1p(-opacity) / copies);
+  double sum = 0, binomial = 1, power = 1;  // C(n, k + 1) and o'^(k + 1), signs apart
+  for (int k = 0; k < copies; ++k) {
+    binomial *= static_cast<double>(copies - k) / (k + 1);
+    power *= each;
+    sum += (k % 2 == 0 ? binomial : -binomial) * power / std::sqrt(k + 1.0);
+  }
+  return {each, std::log(opacity / sum)};
 }
 
 }  // namespace regrade

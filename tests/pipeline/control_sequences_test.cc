@@ -10,7 +10,6 @@
 #include "evaluate/fidelity.h"
 #include "kernels/field/cpu/render_view.h"
 #include "kernels/image/color_statistics.h"
-#include "pipeline/stages/control_ceiling.h"
 #include "pipeline/stages/control_field.h"
 #include "pipeline/stages/frame_gains.h"
 #include "pipeline/stages/linear_map_baseline.h"

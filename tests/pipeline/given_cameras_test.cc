@@ -6,7 +6,6 @@
 #include "kernels/base/random.h"
 #include "pipeline/capture/dtu_cameras.h"
 #include "pipeline/capture/nsvf_cameras.h"
-#include "pipeline/capture/number_file.h"
 #include "pipeline/files/npz_file.h"
 #include "tests/support/expect_error.h"
 #include "tests/support/temporary_folder.h"

@@ -11,7 +11,6 @@
 #include "pipeline/files/atomic_file.h"
 #include "pipeline/program/fetch_file.h"
 #include "pipeline/program/known_networks.h"
-#include "pipeline/program/sha256.h"
 #include "pipeline/program/tensor_bundle.h"
 #include "stylize/image/onnx_stylizer.h"
 #include "tests/support/canned_server.h"

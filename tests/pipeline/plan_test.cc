@@ -114,12 +114,6 @@ TEST(StageEstimate, FollowsSizesAndTheMachinesPace) {
   EXPECT_GT(seconds(longer, size, "render"), 1.3 * seconds(settings, size, "render"));
   EXPECT_NEAR(SecondsOf(EstimateStages(settings, size, Backend::kCpu, 4), "render", "render"),
               0.5 * seconds(settings, size, "render"), 1e-9);
-  // A page of voxels takes as long as there are many.
-  RunSettings finer = settings;
-  finer.fit.resolutions.back() *= 2;
-  EXPECT_GT(seconds(finer, size, "report"), seconds(settings, size, "report") + 10);
-  finer.scene.field = settings.scene.field = "splats";
-  EXPECT_EQ(seconds(finer, size, "report"), seconds(settings, size, "report"));
   // A machine of half the speed, and one whose record is no measure.
   EXPECT_NEAR(MeasuredPace(stages, {{"reconstruct", 2 * stages[1].seconds}}), 2, 1e-9);
   EXPECT_EQ(MeasuredPace(stages, {{"reconstruct", 1e-3 * stages[1].seconds}}), 0.25);

@@ -264,16 +264,14 @@ TEST(Retouch, ALocalEditIsLearnedFromItsPhotoAlone) {
   for (const char* flag : {"--splat-steps", "400", "--splats", "3"})
     reconstruct.push_back(flag);
   ASSERT_EQ(Regrade(reconstruct).code, 0);
-  const ProgramOutcome outcome =
-      Regrade({"retouch", folder / "out", "--photo", "00002.png", "--edited",
-               folder / "s/truth/graded/00002.png", "--name", "dark"});
-  ASSERT_EQ(outcome.code, 0) << outcome.text;
-  EXPECT_SAYS(outcome, "depends on the place");
+  const std::string said =
+      testing::Said({"retouch", folder / "out", "--photo", "00002.png", "--edited",
+                     folder / "s/truth/graded/00002.png", "--name", "dark"});
+  EXPECT_NE(said.find("depends on the place"), std::string::npos) << said;
   EXPECT_TRUE(fs::exists(folder / "out/styles/dark/retouched/00002.png"));
   EXPECT_NE(ReadText(folder / "out/styles/dark/retouch.json").find("\"local\""),
             std::string::npos);
-  // What is measured is the edit: the scene without it is far from it, and at its photo's place
-  // it is all seen.
+  // What is measured is the edit, at its photo's place all of it.
   const std::string frames = folder / "out/styles/dark/frames";
   const JsonValue report = ReadJsonFile(folder / "out/styles/dark/report.json");
   const auto to_edit = [&](const std::string& sequence) {
@@ -335,6 +333,9 @@ TEST(Retouch, ALocalEditIsLearnedFromItsPhotoAlone) {
   // With colours below black in the residual 12.8.
   EXPECT_LE(error_of("views_2d"), 1.5);
   EXPECT_LE(error_of("styled"), 10);
+
+  fs::rename(folder / "out", folder / "moved");
+  EXPECT_SAYS(Regrade({"render", folder / "moved", "--name", "half"}), "done before");
 }
 
 TEST(Retouch, ARenderIsWrittenToBeEdited) {

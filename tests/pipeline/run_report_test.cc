@@ -69,7 +69,7 @@ TEST(RunReport, ShowsEveryPartOfTheRun) {
   std::vector<std::string> run =
       testing::Words("--preset draft --effects exposure=off --device cpu --verbose");
   run.insert(run.begin(), {"run", folder / "s/truth", "--style", style, "--out", folder / "e"});
-  for (const std::string& flag : testing::TinyFlags("voxels")) run.push_back(flag);
+  for (const std::string& flag : testing::TinyFlags()) run.push_back(flag);
   *(std::find(run.begin(), run.end(), "--config") + 1) =
       R"({"style-rays": 512, "fit-resolutions": [24], "fit-steps": [150]})";
   const testing::ProgramOutcome done = Regrade(run);
@@ -187,7 +187,7 @@ TEST(RunReport, ShowsEveryPartOfTheRun) {
     return 0.0;
   };
   EXPECT_GT(to_2d("control_field_2d"), to_2d("source") + 1);
-  // No colours at these voxels are closer than those that were fitted to the pictures.
+  // No colours of these splats are closer than those that were fitted to the pictures.
   EXPECT_GT(to_2d("control_ceiling"), to_2d("styled"));
   EXPECT_GT(to_2d("control_ceiling"), to_2d("control_linear_map"));
   EXPECT_SAYS(bounded, "fitted to the 2D method's pictures");

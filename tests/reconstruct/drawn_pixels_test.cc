@@ -1,9 +1,9 @@
-#include "reconstruct/fit/drawn_pixels.h"
-
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <limits>
+
+#include "reconstruct/fit/training_rays.h"
 
 namespace regrade {
 namespace {

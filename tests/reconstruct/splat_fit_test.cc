@@ -11,7 +11,6 @@
 #include "kernels/splats/seen_depth.h"
 #include "reconstruct/splats/fit_splats.h"
 #include "reconstruct/splats/population.h"
-#include "reconstruct/splats/relocation.h"
 #include "reconstruct/splats/splat_engine.h"
 #include "reconstruct/splats/splat_photos.h"
 #include "tests/support/ball_views.h"
