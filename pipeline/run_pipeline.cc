@@ -6,6 +6,7 @@
 #include <map>
 
 #include "kernels/base/error.h"
+#include "pipeline/capture/photo_names.h"
 #include "pipeline/dry_run.h"
 #include "pipeline/files/text.h"
 #include "pipeline/program/memory.h"
@@ -96,6 +97,27 @@ PlannedStage Planned(const Stage& stage, bool done, RunContext* context) {
   return planned;
 }
 
+// The command that makes a stage which is missing.
+std::string HowToMake(const char* stage, const RunContext& context) {
+  if (IsOfScene(stage) || context.style == nullptr) return "regrade run";
+  return "regrade stylize " + context.workspace->folder() + " --name " +
+         context.settings.style.name;
+}
+
+// What belongs to photos by their names is looked for as soon as these are known: before a fit
+// of hours, of which the style knows nothing. Throws Error(kInput).
+void CheckPictureNames(const RunContext& context) {
+  const RunSettings& settings = context.settings;
+  if (settings.style.pictures.empty()) return;
+  const std::vector<std::string> photos = FilesOf(context.Views().capture());
+  const StyleMethod method = ParseStyleMethod(settings.style_2d);
+  const bool from_folder = method.kind == StyleMethodKind::kFolder;
+  for (const auto& [folder, what] : {std::pair{settings.object.masks, "mask"},
+                                     {settings.residual.Layers(), "layer"},
+                                     {from_folder ? method.argument : "", "picture"}})
+    if (!folder.empty()) PicturesByPhotoName(folder, photos, what);
+}
+
 // Stages of one command keep the photos that they read, unless its memory is limited.
 void KeepPhotos(RunContext* context) {
   constexpr int64_t kMost = int64_t{1} << 30, kOfFree = 8;
@@ -115,7 +137,7 @@ bool RunPipeline(const std::string& first, const std::string& last, RunContext* 
   const StageEntry* const restart = Find(context->settings.start.restart_from);
   if (restart <= Find(last)) runner.RestartFrom(std::max(restart, Find(first))->name);
   for (const StageEntry* before = std::begin(kStages); before != Find(first); ++before)
-    runner.Require(before->name, "regrade run");
+    runner.Require(before->name, HowToMake(before->name, *context));
   Expect(first, last, styles_after, context, &runner);
   KeepPhotos(context);
   for (const StageEntry* entry = Find(first); entry != std::end(kStages); ++entry) {
@@ -127,6 +149,7 @@ bool RunPipeline(const std::string& first, const std::string& last, RunContext* 
       PlanStages(entry[1].name, last, context->planned.back().style, context);
     if (!done) return false;
     if (last == entry->name) break;
+    if (stage.name == "pose") CheckPictureNames(*context);
   }
   if (const KeptPhotos* const photos = context->photos.get();
       photos != nullptr && photos->decoded() > 0)
@@ -241,7 +264,7 @@ void RunPart(const std::string& style, RunContext* context) {
   context->settings.style.name = style;
   const StageRunner runner(context->workspace, context->style, context->console);
   for (const StageEntry* before = std::begin(kStages); before != Find("render"); ++before)
-    runner.Require(before->name, "regrade run");
+    runner.Require(before->name, HowToMake(before->name, *context));
   const Stage stage = RenderStage(context);
   if (folder.Status(stage.name, stage.inputs).state == StageState::kDone)
     context->console->Info("render: done before");

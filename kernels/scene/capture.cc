@@ -79,4 +79,10 @@ std::vector<bool> HeldOutViews(const Capture& capture, int holdout) {
   return held_out;
 }
 
+std::vector<std::string> FilesOf(const Capture& capture) {
+  std::vector<std::string> files;
+  for (const CaptureView& view : capture.views) files.push_back(view.file);
+  return files;
+}
+
 }  // namespace regrade

@@ -80,4 +80,7 @@ bool HasTestSplit(const Capture& capture);
 // photos, or less than two, is passed over. holdout 0 keeps none, and of renders none is kept.
 std::vector<bool> HeldOutViews(const Capture& capture, int holdout);
 
+// CaptureView::file of each view.
+std::vector<std::string> FilesOf(const Capture& capture);
+
 }  // namespace regrade

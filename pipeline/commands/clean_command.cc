@@ -1,4 +1,5 @@
 // regrade clean: removes from a run's folder what can be made again, after a yes.
+#include <algorithm>
 #include <filesystem>
 #include <string>
 #include <vector>
@@ -38,10 +39,14 @@ std::vector<Removable> RemovableIn(const std::string& folder) {
       {".regrade/work", "not needed any more"},
       {kBlocksFolder, "`regrade refine` makes them again"},
       {".regrade/checkpoints", "a stage that was interrupted would begin from its start"}};
+  const std::vector<std::string> learned = LearnedStyles(folder);
   for (const std::string& name : StyleNames(folder)) {
+    const bool is_learned = std::ranges::find(learned, name) != learned.end();
     const std::string style = std::string(kStylesFolder) + "/" + name;
     Workspace::RefuseLinks(StyleFolder(folder, name));
-    all.push_back({style + "/frames", "`regrade render` makes them again"});
+    all.push_back({style + "/frames", is_learned
+                                          ? "`regrade render` makes them again"
+                                          : "the style is not finished, and makes them again"});
     all.push_back({style + "/" + kPartsFolder, "`regrade render --part` makes them again"});
     all.push_back(
         {style + "/field_2d.npz", "made again by `regrade evaluate --controls field`"});

@@ -172,10 +172,13 @@ std::optional<Prepared> Prepare(const Command& command, const Arguments& argumen
       throw InputError("no run has worked in this folder", folder,
                        "make one with `regrade run` or `regrade reconstruct`");
     ReadRunFile(folder + "/run.json");  // refuses folders of another schema
+    const std::string name = options->Given("name").value_or("");
+    const std::vector<std::string> styles = StyleNames(folder);
+    const bool of_style =
+        preparation.continues_style ||
+        (preparation.prefers_style && std::ranges::find(styles, name) != styles.end());
     const std::string style =
-        preparation.continues_style
-            ? StyleFolder(folder, ChosenStyle(folder, options->Given("name").value_or("")))
-            : folder;
+        of_style ? StyleFolder(folder, ChosenStyle(folder, name)) : folder;
     sources.run_json = style + "/run.json";
     sources.folder = folder;
     sources.accept_outside = [&](const OutsideOptions& outside) {

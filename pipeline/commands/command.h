@@ -36,6 +36,8 @@ struct Preparation {
   bool continues_run = false;
   // The same with run.json of the style that --name chooses, or of the last one.
   bool continues_style = false;
+  // With continues_run: run.json of the style that --name names, where there is one.
+  bool prefers_style = false;
   std::vector<std::string> taken = {};
   std::string preset = "standard";  // where none is given
 };

@@ -110,6 +110,8 @@ void RunContactSheet(const Command& command, const Arguments& arguments, Console
   RequireValue(sheet.out, "--out", "name the PNG file to write");
   Workspace workspace(folder);
   const Arguments styles = StylesAmong(prepared->words, console);
+  if (!sheet.out.ends_with(".png"))
+    throw UsageError("'" + sheet.out + "' is no PNG file", "--out", "name it FILE.png");
   CheckResults(folder, styles);
   StoredField geometry = ReadFieldGeometry(workspace.Path("field.npz"));
   const WorkingViews views =

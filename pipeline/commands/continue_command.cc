@@ -54,14 +54,16 @@ void ContinueStyle(const Command& command, const Arguments& arguments, const std
            &context);
 }
 
-// A style that has the name is made again; without pictures, those of the run are.
+// A style that has the name is made again, with its own options; without pictures, of its own,
+// or of the run's.
 void RunStylize(const Command& command, const Arguments& arguments, Console* console) {
   constexpr size_t kMostStyles = 64;
   RunContext context;
   context.console = console;
   context.settings.Bind(&context.options);
   const auto prepared =
-      Prepare(command, arguments, {.most_words = 1 + kMostStyles, .continues_run = true},
+      Prepare(command, arguments,
+              {.most_words = 1 + kMostStyles, .continues_run = true, .prefers_style = true},
               &context.options);
   if (!prepared) return;
   const std::string& folder = prepared->words[0];

@@ -39,6 +39,19 @@ Arguments SpreadLists(const Arguments& words) {
   return spread;
 }
 
+// Options of --frames and --splats that a run has not. Throws Error(kUsage).
+void RefuseOptionsOfFrames(const Arguments& arguments, const OptionSet& options) {
+  RunSettings settings;
+  OptionSet of_run;
+  settings.Bind(&of_run);
+  const JsonValue known = of_run.Values(), all = options.Values();
+  for (const auto& [name, value] : all.AsObject())
+    for (const std::string& word : arguments)
+      if (known.Find(name) == nullptr &&
+          (word == "--" + name || word.starts_with("--" + name + "=")))
+        throw UsageError("belongs to --frames and --splats", "--" + name, "leave it out");
+}
+
 }  // namespace
 
 void RunEvaluate(const Command& command, const Arguments& words, Console* console) {
@@ -57,8 +70,10 @@ void RunEvaluate(const Command& command, const Arguments& words, Console* consol
     const std::string flag = word.substr(0, word.find('='));
     return flag == "--frames" || flag == "--splats" || flag == "--reference";
   });
-  if (!has_frames && !AsksForHelp(arguments))
+  if (!has_frames && !AsksForHelp(arguments)) {
+    RefuseOptionsOfFrames(arguments, options);
     return ContinueStyle(command, arguments, "evaluate", console);
+  }
   if (!Prepare(command, SpreadLists(arguments), {.least_words = 0, .most_words = 0}, &options))
     return;
   if (!splats.splats.empty())

@@ -43,6 +43,8 @@ void ExportLut(const ExportOptions& options, const std::string& folder, Console*
   const std::string style = StyleFolder(folder, name);
   const ColorTable own = OwnMapOf(style);
   if (own.size == 0) ChosenLearnedStyle(folder, name);
+  if (!IsCubeFile(options.out))
+    throw UsageError("'" + options.out + "' is no LUT", "--out", "name it LOOK.cube");
   if (options.dry_run) {
     console->Info(Concat("style ", name, " would be written to ", options.out, " as a LUT of ",
                          kSize, "^3 colours"));

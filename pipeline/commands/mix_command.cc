@@ -195,8 +195,8 @@ void RunMix(const Command& command, const Arguments& arguments, Console* console
     mixed.field = MixFields(stored.field, fields, keys.points[0], object_weights);
     WriteFieldFile(settings.out + "/mixed.npz", mixed);
   }
-  console->Info(
-      Concat("wrote ", Counted(std::ssize(cameras.film), "frame"), " to ", settings.out));
+  console->Info(Concat("wrote ", Counted(std::ssize(cameras.film), "frame"), " of ",
+                       Join(chosen, ", "), " to ", settings.out));
 }
 
 }  // namespace regrade

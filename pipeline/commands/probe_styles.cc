@@ -1,5 +1,9 @@
 #include "pipeline/commands/probe_styles.h"
 
+#include <filesystem>
+#include <utility>
+
+#include "evaluate/flow_folder.h"
 #include "kernels/base/error.h"
 #include "pipeline/commands/command.h"
 #include "pipeline/images/cube_file.h"
@@ -7,6 +11,15 @@
 #include "pipeline/stages/network_probe.h"
 
 namespace regrade {
+namespace {
+
+// Of files:DIR, or nothing.
+std::string FlowFolderOf(const std::string& flow) {
+  const std::string prefix = kFlowFiles;
+  return flow.starts_with(prefix) ? flow.substr(prefix.size()) : "";
+}
+
+}  // namespace
 
 void CheckStyle(const std::string& path, const RunSettings& settings) {
   if (IsCubeFile(path)) {
@@ -41,6 +54,12 @@ void ProbeStyles(RunSettings* settings, Console* console) {
   ProbeMethod(&settings->style_2d,
               start.dry_run ? NetworkAccess() : AccessAfterYes(start.yes, console));
   ProbeMasks(&settings->object);
+  ProbeEvaluationNetworks(settings->consistency);
+  for (const auto& [folder, option] :
+       {std::pair{settings->residual.Layers(), "--residual layers:"},
+        {FlowFolderOf(settings->consistency.flow), "--flow files:"}})
+    if (!folder.empty() && !std::filesystem::is_directory(folder))
+      throw InputError("there is no such folder", folder, std::string("correct ") + option);
 }
 
 }  // namespace regrade

@@ -4,11 +4,13 @@
 #include "kernels/base/error.h"
 #include "pipeline/capture/effect_words.h"
 #include "pipeline/commands/command.h"
+#include "pipeline/files/text.h"
 #include "pipeline/program/device_choice.h"
 #include "pipeline/run/run_file.h"
 #include "pipeline/stages/block_fit.h"
 #include "pipeline/stages/block_join.h"
 #include "pipeline/workspace/folder_lock.h"
+#include "pipeline/workspace/style_folders.h"
 
 namespace regrade {
 namespace {
@@ -112,6 +114,10 @@ void Refine(RunContext* context) {
     MakeBlocks(context, folder);
   if (refine.One()) return;
   JoinBlocks(context, folder);
+  const std::string& out = context->workspace->folder();
+  if (const std::vector<std::string> styles = StyleNames(out); !styles.empty())
+    console->Info("of the field before: " + Join(styles, ", ") + "; `regrade stylize " + out +
+                  " --name NAME` makes each again");
   const int size = context->settings.scene.photo_size;
   const int64_t of_run =
       ReadRunFile(context->workspace->Path("run.json")).options.At("photo-size").AsInt();

@@ -47,7 +47,6 @@ void ProbeInputs(const std::string& command, RunContext* context) {
   }
   if (command != "run") return;
   ProbeStyles(&context->settings, context->console);
-  ProbeEvaluationNetworks(context->settings.consistency);
 }
 
 }  // namespace

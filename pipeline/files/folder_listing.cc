@@ -90,12 +90,9 @@ void ListInto(const fs::path& folder, const std::string& prefix, const fs::path&
 FolderListing ListFolder(const std::string& folder) {
   std::error_code error;
   const fs::path root = fs::canonical(folder, error);
-  if (error)
-    throw InputError("no such folder: " + error.message(), folder,
-                     "give the folder that holds the photos");
+  if (error) throw InputError("no such folder: " + error.message(), folder, "correct its name");
   if (!fs::is_directory(root, error))
-    throw InputError("this is a file, not a folder", folder,
-                     "give the folder that holds the photos");
+    throw InputError("this is a file, not a folder", folder, "name the folder that has it");
   FolderListing listing;
   ListInto(root, "", root, &listing);
   std::ranges::sort(listing.files, NaturalLess, &ListedFile::name);

@@ -28,18 +28,23 @@ int64_t OnePhotoIn(const RunSettings& settings, const FitPlace& place) {
   });
 }
 
+FitInMemory Lowered(const RunSettings& settings, const FitPlace& place) {
+  FitInMemory fit{place, settings, ""};
+  const int64_t one_in = OnePhotoIn(settings, place);
+  fit.place.pixels /= one_in;
+  fit.place.photos = (place.photos + one_in - 1) / one_in;
+  std::vector<std::string> sentences;
+  if (one_in > 1) sentences.push_back(FewerPhotosText(one_in, fit.place.photos, place));
+  if (const std::string lowered = FitKindOf(settings).lower(fit.place, &fit.settings);
+      !lowered.empty())
+    sentences.push_back(lowered);
+  fit.notice = Join(sentences, "; ");
+  return fit;
+}
+
 std::string MemoryWarning(const RunSettings& settings, const FitPlace& place) {
   try {
-    const int64_t one_in = OnePhotoIn(settings, place);
-    FitPlace fitted = place;
-    fitted.pixels /= one_in;
-    fitted.photos = (place.photos + one_in - 1) / one_in;
-    std::vector<std::string> sentences;
-    if (one_in > 1) sentences.push_back(FewerPhotosText(one_in, fitted.photos, place));
-    if (const std::string lowered = FitKindOf(settings).lowered(settings, fitted);
-        !lowered.empty())
-      sentences.push_back(lowered);
-    return Join(sentences, "; ");
+    return Lowered(settings, place).notice;
   } catch (const Error& error) {
     if (error.code() != ExitCode::kResources) throw;
     return error.what_failed() + (error.hint().empty() ? "" : ": " + error.hint());

@@ -33,8 +33,9 @@ struct FitKind {
   StagePlan (*plan)(const RunSettings& settings, const FitPlace& place);
   // What it would store, likewise.
   PlannedField (*field)(const RunSettings& settings, const FitPlace& place);
-  // What it is lowered to, or an empty text. Throws Error(kResources).
-  std::string (*lowered)(const RunSettings& settings, const FitPlace& place);
+  // Lowers the settings to what memory holds, and says so, or returns an empty text. Throws
+  // Error(kResources).
+  std::string (*lower)(const FitPlace& place, RunSettings* settings);
   std::vector<MeasuredOption> (*measured)(const RunSettings& settings);
   // With `settings` adapted to `place`. Seeds and sums follow the settings, too.
   std::unique_ptr<FieldFit> (*make)(const RunSettings& settings, const FitPlace& place);
@@ -46,6 +47,15 @@ const FitKind& FitKindOf(const RunSettings& settings);
 
 // As the function of that name for a draft; 1 for every other fit.
 int64_t OnePhotoIn(const RunSettings& settings, const FitPlace& place);
+
+// What memory leaves of a fit: the photos of the place, the settings, and what a person should
+// know of it, or nothing. Throws Error(kResources) where nothing is left.
+struct FitInMemory {
+  FitPlace place;
+  RunSettings settings;
+  std::string notice;
+};
+FitInMemory Lowered(const RunSettings& settings, const FitPlace& place);
 
 // What a person should know of the fit's memory before it begins: that less than it takes is
 // free, how many photos of the place's it is left, and what it is lowered to; or nothing.

@@ -89,7 +89,13 @@ void CheckRequirements(const RunSettings& settings) {
   if (!required.empty() && settings.start.until != "report")
     throw UsageError("metrics are measured after stage " + settings.start.until, "--require",
                      "leave out --until");
+  const ConsistencyOptions& evaluated = settings.consistency;
   for (const Requirement& wanted : required) {
+    const bool by_network = wanted.metric.starts_with("lpips");
+    if ((by_network && evaluated.lpips.empty()) ||
+        (wanted.metric == "edge_ssim" && evaluated.edges.empty()))
+      throw UsageError("nothing measures it", "--require " + wanted.text,
+                       by_network ? "add --lpips FILE.onnx" : "set the constant edges");
     if (!wanted.subject.starts_with(kPathPrefix) || MeasuresFilm(settings)) continue;
     const bool views = settings.render.path.path == "views";
     throw UsageError("the film is not measured on its path, " + wanted.text + " has no number",

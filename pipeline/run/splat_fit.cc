@@ -98,8 +98,10 @@ PlannedField PlannedSplatField(const RunSettings& settings, const FitPlace& plac
   return PlanField(AtMostOfPixels(settings.splats, place));
 }
 
-std::string LoweredSplats(const RunSettings& settings, const FitPlace& place) {
-  return SplatsWithinMemory(settings.splats, place).notice;
+std::string LowerSplats(const FitPlace& place, RunSettings* settings) {
+  PlannedSplatFit fit = SplatsWithinMemory(settings->splats, place);
+  settings->splats = fit.options;
+  return fit.notice;
 }
 
 std::vector<MeasuredOption> MeasuredOfSplats(const RunSettings& settings) {
@@ -128,7 +130,7 @@ const FitKind kSplatFit{.name = "splats",
                         .check = CheckSplatSettings,
                         .plan = PlanSplats,
                         .field = PlannedSplatField,
-                        .lowered = LoweredSplats,
+                        .lower = LowerSplats,
                         .measured = MeasuredOfSplats,
                         .make = MakeSplatFit};
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "kernels/base/error.h"
 #include "pipeline/fields/film_timing.h"
 #include "pipeline/run/fit_kind.h"
 #include "pipeline/run/plan.h"
@@ -61,6 +62,18 @@ double EvaluateSeconds(const RunSettings& settings, const CaptureSize& size) {
   return kPair * pairs * Megapixels(size, settings.scene.photo_size);
 }
 
+// Of --max-memory; what is free changes from one moment to the next.
+FitInMemory WithinGivenMemory(const RunSettings& settings, FitPlace place) {
+  if (settings.run.max_memory_gb > 0) {
+    place.max_memory_gb = settings.run.max_memory_gb;
+    try {
+      return Lowered(settings, place);
+    } catch (const Error&) {  // MemoryWarning says so
+    }
+  }
+  return {place, settings, ""};
+}
+
 }  // namespace
 
 CaptureSize SizeOfCapture(const Capture& capture) {
@@ -93,11 +106,11 @@ std::vector<StageEstimate> EstimateStages(const RunSettings& settings, const Cap
   const double on_card = backend == Backend::kCuda ? kFasterOnCard : 1;
   const double photo = Megapixels(size, settings.scene.photo_size),
                photos = static_cast<double>(size.photos);
-  const FitPlace place = PlaceOf(settings, size, backend);
+  const FitInMemory within = WithinGivenMemory(settings, PlaceOf(settings, size, backend));
   const FitKind& kind = FitKindOf(settings);
-  const StagePlan fit = kind.plan(settings, place);
-  StagePlan stylize =
-      PlanStyle(settings.network, kind.field(settings, place), 1e6 * photo, photos, threads);
+  const StagePlan fit = kind.plan(within.settings, within.place);
+  StagePlan stylize = PlanStyle(settings.network, kind.field(within.settings, within.place),
+                                1e6 * photo, photos, threads);
   if (settings.residual.On())
     stylize.seconds += Scaled(kOfResidual * kFrame * photos * photo, threads);
   return {

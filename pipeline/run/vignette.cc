@@ -19,8 +19,10 @@ Vignette ParseVignette(const std::string& text) {
   for (double s = 0; good && s <= 1; s += 1.0 / 64)
     good = vignette(s) >= 0.05 && vignette(s) <= 4;  // not of a value that is not finite
   if (!good)
-    throw UsageError("'" + text + "' is no vignette", "--vignette",
-                     "use none, or two numbers A,B with 1 + A r^2 + B r^4 between 0.05 and 4");
+    throw UsageError(
+        "'" + text + "' is no vignette", "--vignette",
+        "use none, or two numbers A,B with 1 + A r^2 + B r^4 between 0.05 and 4; edit is of "
+        "`regrade retouch`");
   return vignette;
 }
 

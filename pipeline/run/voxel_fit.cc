@@ -106,8 +106,10 @@ PlannedField PlannedGrid(const RunSettings& settings, const FitPlace& place) {
   return PlanField(AdaptedTo(settings.fit, place), place.box);
 }
 
-std::string LoweredVoxels(const RunSettings& settings, const FitPlace& place) {
-  return FitWithinMemory(AdaptedTo(settings.fit, place), place).notice;
+std::string LowerVoxels(const FitPlace& place, RunSettings* settings) {
+  PlannedFit fit = FitWithinMemory(AdaptedTo(settings->fit, place), place);
+  settings->fit = std::move(fit.options);
+  return fit.notice;
 }
 
 std::vector<MeasuredOption> MeasuredOfVoxels(const RunSettings& settings) {
@@ -146,7 +148,7 @@ const FitKind kVoxelFit{.name = "voxels",
                         .check = CheckVoxelSettings,
                         .plan = PlanVoxels,
                         .field = PlannedGrid,
-                        .lowered = LoweredVoxels,
+                        .lower = LowerVoxels,
                         .measured = MeasuredOfVoxels,
                         .make = MakeVoxelFit};
 

@@ -68,9 +68,8 @@ std::vector<Image> PicturesOf(const std::string& folder, const std::string& kind
                               const WorkingViews& views) {
   std::vector<Image> pictures(static_cast<size_t>(views.count()));
   if (folder.empty()) return pictures;
-  std::vector<std::string> photos;
-  for (const CaptureView& view : views.capture().views) photos.push_back(view.file);
-  const std::vector<std::string> paths = PicturesByPhotoName(folder, photos, kind);
+  const std::vector<std::string> paths =
+      PicturesByPhotoName(folder, FilesOf(views.capture()), kind);
   for (size_t i = 0; i < pictures.size(); ++i) {
     if (paths[i].empty()) continue;
     const Camera camera = views.CameraOf(static_cast<int>(i));

@@ -11,7 +11,7 @@
 #include "pipeline/files/text.h"
 #include "pipeline/program/memory.h"
 #include "pipeline/run/plan.h"
-#include "reconstruct/views/splat_extent.h"
+#include "reconstruct/views/scene_extent.h"
 
 namespace regrade {
 namespace {

@@ -111,11 +111,8 @@ std::unique_ptr<ViewStylizer> MakeMethod(RunContext* context, const Capture& cap
   switch (method.kind) {
     case StyleMethodKind::kOnnx:
       return MakeOnnxStylizer(method.argument, settings.style_2d.max_side, style);
-    case StyleMethodKind::kFolder: {
-      std::vector<std::string> photos;
-      for (const CaptureView& view : capture.views) photos.push_back(view.file);
-      return MakeFolderStylizer(method.argument, photos);
-    }
+    case StyleMethodKind::kFolder:
+      return MakeFolderStylizer(method.argument, FilesOf(capture));
     case StyleMethodKind::kCommand:
       return MakeCommandStylizer(method.argument, path, settings.style_2d.command_limit_s);
     default:

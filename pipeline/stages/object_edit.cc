@@ -16,9 +16,7 @@ static_assert(ObjectMasks::kMostRegions == kMostObjectRegions);
 std::unique_ptr<ObjectMasks> OpenObjectMasks(const RunSettings& settings,
                                              const WorkingViews& views) {
   if (!settings.object.On()) return nullptr;
-  std::vector<std::string> photos;
-  for (const CaptureView& view : views.capture().views) photos.push_back(view.file);
-  return std::make_unique<ObjectMasks>(settings.object, photos, views);
+  return std::make_unique<ObjectMasks>(settings.object, FilesOf(views.capture()), views);
 }
 
 ObjectWeights VoteForObject(const RunSettings& settings, const WorkingViews& working_views,

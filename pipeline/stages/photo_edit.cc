@@ -206,7 +206,7 @@ Image EditAtPhotoSize(const Image& edited, const Image& photo, const std::string
   if (std::abs(stretch - 1) > 0.01)
     throw InputError(
         Concat("is ", edited.width, "x", edited.height,
-               " pixels, the photo has another shape: ", photo.width, "x", photo.height),
+               " pixels, the photo has another shape, as ", photo.width, "x", photo.height),
         where, "undo crop and turn, and export the whole frame again");
   const Image same =
       edited.SameSize(photo) ? edited : Resize(edited, photo.width, photo.height);

@@ -11,7 +11,7 @@
 #include "kernels/splats/splat_field.h"
 #include "pipeline/stages/splat_views.h"
 #include "reconstruct/colmap/colmap_model.h"
-#include "reconstruct/views/splat_extent.h"
+#include "reconstruct/views/scene_extent.h"
 
 namespace regrade {
 namespace {

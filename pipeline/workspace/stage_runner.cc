@@ -58,6 +58,20 @@ std::string StageRunner::Finished() const {
   return finished + (finished.empty() || of_style.empty() ? "" : ", ") + of_style;
 }
 
+namespace {
+
+// Of many reasons a few: all files of a folder may be gone.
+std::vector<std::string> FirstOf(std::vector<std::string> reasons) {
+  constexpr size_t kSaid = 8;
+  if (reasons.size() <= kSaid) return reasons;
+  const size_t more = reasons.size() - kSaid;
+  reasons.resize(kSaid);
+  reasons.push_back(Concat("and ", more, " more"));
+  return reasons;
+}
+
+}  // namespace
+
 void StageRunner::ForgetAfter(const std::string& stage) {
   for (size_t i = PlaceOf(stage) + 1; i < std::size(kStageNames); ++i)
     if (Workspace* folder = FolderOf(kStageNames[i])) folder->Forget(kStageNames[i]);
@@ -80,7 +94,8 @@ bool StageRunner::Run(const Stage& stage) {
         folder->folder(),
         "use the old ones, another --out, or --restart-from " + stage.name +
             " to replace what is there");
-  const std::string why = status.why.empty() ? "" : " (" + Join(status.why, "; ") + ")";
+  const std::string why =
+      status.why.empty() ? "" : " (" + Join(FirstOf(status.why), "; ") + ")";
   if (dry_run_) {
     console_->Info(stage.name + ": would be done" + why +
                    (stage.plan.empty() ? "" : ": " + stage.plan) + About(stage.name));

@@ -143,7 +143,7 @@ std::vector<std::string> LearnedStyles(const std::string& folder,
 std::string LeftOutText(const std::string& folder, const std::vector<std::string>& left) {
   if (left.empty()) return "";
   return "left out: " + Join(left, ", ") + (left.size() == 1 ? " is" : " are") +
-         " not finished; `regrade stylize " + folder + " --name NAME --style PICTURE` goes on";
+         " not finished; `regrade stylize " + folder + " --name NAME` goes on";
 }
 
 std::string ChosenStyle(const std::string& folder, const std::string& name) {
@@ -176,8 +176,7 @@ std::string ChosenLearnedStyle(const std::string& folder, const std::string& nam
   if (IsLearned(folder, chosen)) return chosen;
   const std::vector<std::string> learned = LearnedStyles(folder);
   throw InputError("style '" + chosen + "' is not finished", folder,
-                   "go on with `regrade stylize " + folder + " --name " + chosen +
-                       " --style PICTURE`" +
+                   "go on with `regrade stylize " + folder + " --name " + chosen + "`" +
                        (learned.empty() ? "" : ", or name one of " + Join(learned, ", ")));
 }
 

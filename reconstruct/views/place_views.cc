@@ -11,7 +11,7 @@
 #include "kernels/base/quantile.h"
 #include "kernels/scene/facing.h"
 #include "reconstruct/views/probe_view.h"
-#include "reconstruct/views/splat_extent.h"
+#include "reconstruct/views/scene_extent.h"
 
 namespace regrade {
 namespace {

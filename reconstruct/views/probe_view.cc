@@ -6,7 +6,7 @@
 #include "kernels/base/quantile.h"
 #include "kernels/base/random.h"
 #include "kernels/splats/splat_field.h"
-#include "reconstruct/views/splat_extent.h"
+#include "reconstruct/views/scene_extent.h"
 
 namespace regrade {
 namespace {

@@ -8,7 +8,7 @@
 
 #include "kernels/base/quantile.h"
 #include "kernels/splats/covariance.h"
-#include "reconstruct/views/splat_extent.h"
+#include "reconstruct/views/scene_extent.h"
 
 namespace regrade {
 namespace {

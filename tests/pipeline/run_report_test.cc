@@ -157,6 +157,8 @@ TEST(RunReport, ShowsEveryPartOfTheRun) {
 
   // Evaluated again with other pairs: the maps of the earlier ones are gone.
   testing::Said({"evaluate", folder / "e", "--gaps", "2"});
+  for (const char* other : {"--format=csv", "--out=x", "--target=x"})
+    EXPECT_EQ(Regrade({"evaluate", folder / "e", other}).code, 2) << other;
   EXPECT_EQ(HeatMapsNamed(folder / "e/styles/style_sunset"), 6);
   EXPECT_EQ(HeatMapFiles(folder / "e/styles/style_sunset"), 6);
 

@@ -164,6 +164,8 @@ TEST(Styles, StrengthIsAMixOfSceneAndStyle) {
               ReadImage(folder / "e/styles/s/frames/source/00001.png").pixels)
         << sequence;
   EXPECT_EQ(Regrade({"stylize", folder / "e", "--name", "s", "--strength", "1.5"}).code, 2);
+  // By its name a style goes on with its own options.
+  EXPECT_SAYS(Regrade({"stylize", folder / "e", "--name", "s"}), "render: done before");
 }
 
 // Starts the run three times and kills it each time, within the second and the third style;

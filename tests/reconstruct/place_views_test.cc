@@ -8,8 +8,8 @@
 
 #include "kernels/splats/splat_field.h"
 #include "reconstruct/views/probe_view.h"
+#include "reconstruct/views/scene_extent.h"
 #include "reconstruct/views/scene_up.h"
-#include "reconstruct/views/splat_extent.h"
 #include "tests/support/expect_error.h"
 #include "tests/support/pinhole.h"
 #include "tests/support/small_splats.h"

@@ -1,4 +1,4 @@
-#include "reconstruct/views/splat_extent.h"
+#include "reconstruct/views/scene_extent.h"
 
 #include <algorithm>
 #include <cmath>
