@@ -41,24 +41,36 @@ void CubicWeights(double t, double* w) {
   w[3] = t * t * (-0.5 + 0.5 * t);
 }
 
-// Of one channel; x and y as in kernels/image/warp.h.
-float SampleCubic(const Image& image, double x, double y, int channel) {
+// x and y as in kernels/image/warp.h.
+template <int kChannels>
+void SampleCubic(const Image& image, double x, double y, float* result) {
   const int x0 = static_cast<int>(std::floor(x)), y0 = static_cast<int>(std::floor(y));
-  double across[4], down[4], sum = 0;
+  double across[4], down[4], sum[kChannels] = {};
   CubicWeights(x - x0, across);
   CubicWeights(y - y0, down);
-  float least = std::numeric_limits<float>::infinity(), most = -least;
-  for (int j = 0; j < 4; ++j)
+  int column[4];  // of values
+  for (int i = 0; i < 4; ++i)
+    column[i] = kChannels * std::clamp(x0 - 1 + i, 0, image.width - 1);
+  constexpr float kInfinity = std::numeric_limits<float>::infinity();
+  float least[kChannels], most[kChannels];
+  std::fill_n(least, kChannels, kInfinity);
+  std::fill_n(most, kChannels, -kInfinity);
+  for (int j = 0; j < 4; ++j) {
+    const float* const row = image.at(0, std::clamp(y0 - 1 + j, 0, image.height - 1));
     for (int i = 0; i < 4; ++i) {
-      const float value = image.at(std::clamp(x0 - 1 + i, 0, image.width - 1),
-                                   std::clamp(y0 - 1 + j, 0, image.height - 1))[channel];
-      sum += across[i] * down[j] * value;
-      if (i == 0 || i == 3 || j == 0 || j == 3) continue;
-      least = std::min(least, value);
-      most = std::max(most, value);
+      const double weight = across[i] * down[j];
+      for (int c = 0; c < kChannels; ++c) sum[c] += weight * row[column[i] + c];
     }
-  return std::isfinite(sum) ? std::clamp(static_cast<float>(sum), least, most)
-                            : std::numeric_limits<float>::quiet_NaN();
+    for (int i = 1; i < 3 && (j == 1 || j == 2); ++i)
+      for (int c = 0; c < kChannels; ++c) {
+        least[c] = std::min(least[c], row[column[i] + c]);
+        most[c] = std::max(most[c], row[column[i] + c]);
+      }
+  }
+  for (int c = 0; c < kChannels; ++c)
+    result[c] = std::isfinite(sum[c])
+                    ? std::clamp(static_cast<float>(sum[c]), least[c], most[c])
+                    : std::numeric_limits<float>::quiet_NaN();
 }
 
 }  // namespace
@@ -71,6 +83,10 @@ Image UndistortPhoto(const Image& photo, const Camera& camera) {
   own.ndc = {};
   const Camera plain = own.Undistorted();
   Image result(photo.width, photo.height, photo.channels);
+  const auto sample = photo.channels == 1   ? SampleCubic<1>
+                      : photo.channels == 3 ? SampleCubic<3>
+                                            : SampleCubic<4>;
+  REGRADE_CHECK(photo.channels == 1 || photo.channels == 3 || photo.channels == 4);
   const double farthest = std::hypot(std::max(plain.cx, plain.width - plain.cx) / plain.fx,
                                      std::max(plain.cy, plain.height - plain.cy) / plain.fy);
   const double fold = LargestUnfoldedRadius(own, farthest * 1.01);
@@ -79,11 +95,13 @@ Image UndistortPhoto(const Image& photo, const Camera& camera) {
     for (int x = 0; x < photo.width; ++x) {
       const Vec3d ray = plain.CameraRay(x + 0.5, y + 0.5);
       double u, v;
-      const bool seen = std::hypot(ray.x, ray.y) < fold && own.Project(ray, &u, &v) && u >= 0 &&
-                        v >= 0 && u <= photo.width && v <= photo.height;
-      for (int c = 0; c < photo.channels; ++c)
-        result.at(x, y)[c] = seen ? SampleCubic(photo, u - 0.5, v - 0.5, c)
-                                  : std::numeric_limits<float>::quiet_NaN();
+      const bool seen = ray.x * ray.x + ray.y * ray.y < fold * fold &&
+                        own.Project(ray, &u, &v) && u >= 0 && v >= 0 && u <= photo.width &&
+                        v <= photo.height;
+      if (seen)
+        sample(photo, u - 0.5, v - 0.5, result.at(x, y));
+      else
+        std::fill_n(result.at(x, y), photo.channels, std::numeric_limits<float>::quiet_NaN());
     }
   return result;
 }

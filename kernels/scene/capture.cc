@@ -85,4 +85,12 @@ std::vector<std::string> FilesOf(const Capture& capture) {
   return files;
 }
 
+int64_t LargestPhotoBytes(const Capture& capture) {
+  constexpr int64_t kOfPixel = 2 * 3 * sizeof(float);  // as decoded, and once more
+  int64_t most = 0;
+  for (const CaptureView& view : capture.views)
+    most = std::max(most, int64_t{view.camera.width} * view.camera.height);
+  return kOfPixel * most;
+}
+
 }  // namespace regrade

@@ -83,4 +83,7 @@ std::vector<bool> HeldOutViews(const Capture& capture, int holdout);
 // CaptureView::file of each view.
 std::vector<std::string> FilesOf(const Capture& capture);
 
+// Memory of the largest photo while it is decoded and made smaller.
+int64_t LargestPhotoBytes(const Capture& capture);
+
 }  // namespace regrade

@@ -20,6 +20,7 @@ JsonValue Triple(const Vec3d& v) { return JsonValue::Array{v.x, v.y, v.z}; }
 template <typename Change>
 void ForEachValue(const PhotoGain& gain, Image* picture, const Change& change) {
   const bool even = gain.falloff == LensFalloff{};
+#pragma omp parallel for schedule(static)
   for (int64_t p = 0; p < picture->num_pixels(); ++p) {
     const auto x = static_cast<double>(p % picture->width),
                y = static_cast<double>(p / picture->width);

@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "kernels/base/error.h"
+#include "kernels/base/parallel_tasks.h"
 #include "kernels/scene/srgb.h"
 #include "pipeline/images/image_file.h"
 #include "reconstruct/refinement/exposure_folds.h"
@@ -62,22 +63,30 @@ TrackColors ReadTrackColors(const Capture& capture) {
   std::vector<Vec3d> positions;
   for (const ScenePoint& point : capture.points) positions.push_back(point.position);
   const std::vector<int> folds = SpatialFolds(positions, kFoldLevels);
-  TrackColors colors;
-  for (size_t v = 0; v < capture.views.size(); ++v) {
+  const auto of_view = [&](int64_t i) {
+    const auto v = static_cast<size_t>(i);
     const CaptureView& view = capture.views[v];
     const Image photo = ReadImage(view.path);
     if (photo.channels != 3) throw InputError("not an RGB picture", view.path);
-    colors.clipped.push_back(ClippedFraction(photo));
+    TrackColors own{{}, {ClippedFraction(photo)}};
     for (const int32_t p : points_of_view[v]) {
       double x = 0, y = 0;
       ColorObservation observation{static_cast<int32_t>(v), p, {}, folds[p]};
       if (view.camera.Project(capture.points[p].position, &x, &y) &&
           WindowLight(photo, x, y, &observation.light)) {
         observation.radius2 = Radius2(photo.width, photo.height, x, y);
-        colors.observations.push_back(observation);
+        own.observations.push_back(observation);
       }
     }
-  }
+    return own;
+  };
+  TrackColors colors;
+  MakeAhead(std::ssize(capture.views), LargestPhotoBytes(capture), of_view,
+            [&colors](int64_t, const TrackColors& own) {
+              colors.clipped.push_back(own.clipped[0]);
+              colors.observations.insert(colors.observations.end(), own.observations.begin(),
+                                         own.observations.end());
+            });
   return colors;
 }
 

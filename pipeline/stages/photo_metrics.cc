@@ -5,6 +5,7 @@
 #include <numeric>
 
 #include "evaluate/image_quality.h"
+#include "kernels/base/parallel_tasks.h"
 #include "kernels/image/detail_kept.h"
 #include "kernels/render/field_renderer.h"
 
@@ -31,9 +32,9 @@ PhotoMetrics MeasureOnPhotos(
   const WorkingViews as_taken = views.AsTaken().InField(stored);
   const FieldRenderer renderer(stored.field, backend);
   PhotoMetrics metrics;
-  for (const int i : of) {
-    Image photo = as_taken.PhotoToFit(i);
-    if (photo.empty()) continue;
+  const auto measure = [&](int64_t k, Image photo) {
+    if (photo.empty()) return;
+    const int i = of[static_cast<size_t>(k)];
     Image rendered = renderer.Render(as_taken.CameraOf(i)).color;
     PutGain(views.Gain(i), &rendered);
     Append(Psnr(rendered, photo), &metrics.psnr);
@@ -42,11 +43,14 @@ PhotoMetrics MeasureOnPhotos(
     Append(detail.kept, &metrics.detail_kept);
     Append(detail.levels, &metrics.detail_error);
     metrics.files.push_back(views.View(i).file);
-    if (!perceptual) continue;
+    if (!perceptual) return;
     for (size_t v = 0; v < photo.pixels.size(); ++v)
       if (!std::isfinite(photo.pixels[v])) photo.pixels[v] = rendered.pixels[v];
     metrics.lpips.push_back(perceptual(rendered, photo));
-  }
+  };
+  MakeAhead(
+      std::ssize(of), LargestPhotoBytes(as_taken.capture()),
+      [&](int64_t k) { return as_taken.PhotoToFit(of[static_cast<size_t>(k)]); }, measure);
   return metrics;
 }
 

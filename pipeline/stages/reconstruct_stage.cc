@@ -4,6 +4,7 @@
 #include <string>
 
 #include "kernels/base/error.h"
+#include "kernels/base/parallel_tasks.h"
 #include "pipeline/capture/capture_store.h"
 #include "pipeline/capture/guessed_depths.h"
 #include "pipeline/capture/measured_depths.h"
@@ -146,16 +147,18 @@ StageOutcome Reconstruct(RunContext* context, const JsonValue& inputs,
   if (!depth_network.empty())
     AddGuessedDepths(depth_network, views, training, parts.Next(kGuesses), &seen, &depth_notes);
   for (const std::string& note : depth_notes) context->console->Info(note);
-  for (size_t f = 0; f < training.size(); ++f) {
-    const int i = training[f];
-    Image photo = views.PhotoToFit(i);
-    if (photo.empty()) {
-      context->console->Info(views.View(i).file + ": its mask leaves nothing to fit");
-      continue;
-    }
-    photos.push_back(std::move(photo));
-    training_views.push_back({views.CameraOf(i), &photos.back(), std::move(seen[f])});
-  }
+  MakeAhead(
+      std::ssize(training), LargestPhotoBytes(capture),
+      [&](int64_t f) { return views.PhotoToFit(training[static_cast<size_t>(f)]); },
+      [&](int64_t f, Image photo) {
+        const int i = training[static_cast<size_t>(f)];
+        if (photo.empty())
+          return context->console->Info(views.View(i).file +
+                                        ": its mask leaves nothing to fit");
+        photos.push_back(std::move(photo));
+        training_views.push_back(
+            {views.CameraOf(i), &photos.back(), std::move(seen[static_cast<size_t>(f)])});
+      });
 
   FieldFitHooks hooks;  // its note is the row of view dependence: must survive a stop
   hooks.checkpoint = [&](const std::vector<std::string_view>& pieces) {
