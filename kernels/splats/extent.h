@@ -1,5 +1,4 @@
-// A splat's opacity, see EQ(splat-opacity), and the part of the screen where
-// it is seen.
+// A splat's opacity, see EQ(splat-opacity), and the part of the screen where it is seen.
 //
 // EQ(splat-extent): seen where q = d^T S^-1 d <= Q = 2 (ln(o rho) + ln 255). The largest |d_x|
 // with q <= Q is where S^-1 d is along x, d = S e_x m: q = m^2 S_xx = Q and d_x = m S_xx, so

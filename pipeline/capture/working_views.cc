@@ -144,13 +144,6 @@ Image WorkingViews::Photo(int i) const {
   return photo;
 }
 
-int64_t WorkingViews::PhotoBytes() const {
-  int64_t most = 0;
-  for (const CaptureView& view : capture().views)
-    most = std::max(most, int64_t{view.camera.width} * view.camera.height);
-  return most * 2 * 3 * static_cast<int64_t>(sizeof(float));
-}
-
 Image WorkingViews::Mask(int i) const {
   const std::string path = StagedMaskOf(View(i).path);
   const bool masked = std::filesystem::is_regular_file(path);

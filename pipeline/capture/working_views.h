@@ -61,8 +61,6 @@ class WorkingViews {
 
   // The photo at the size of its camera, 3 channels, its gain undone. Throws Error(kInput).
   Image Photo(int i) const;
-  // About the most memory that reading one takes.
-  int64_t PhotoBytes() const;
   // [H, W, 1]: 1 where no part of a pixel is masked (--photo-masks) or beyond an undistorted
   // photo, else 0. Empty (0 x 0) where the photo has no mask.
   Image Mask(int i) const;

@@ -92,8 +92,9 @@ void PrintHelp(const Command& command, const Arguments& arguments, bool continue
       std::printf("\n--no-NAME turns off a switch that is on.\n");
     if (continues)
       std::printf(
-          "\nWhat is not given is as in run.json of DIR; what its poses and its fit need stays "
-          "so.\n");
+          "\nWhat is not given is as in run.json of DIR, or of the style that is continued; "
+          "what "
+          "its poses and its fit need stays so.\n");
   }
 }
 
@@ -111,7 +112,8 @@ bool AcceptOutside(const std::string& run_json, const OutsideOptions& outside, b
   if (CanAsk() && AnsweredYes(Printable(run_json + " " + what + ". Go on with it?")))
     return true;
   throw UsageError(what, run_json,
-                   "if you trust it, add --yes, or give these options as flags");
+                   "if you trust it, add --yes, or give these options yourself (constants with "
+                   "--config)");
 }
 
 }  // namespace
@@ -219,7 +221,8 @@ std::string AbsolutePath(const std::string& path) {
   if (error)
     throw ResourceError("the current folder does not exist: " + error.message(), path,
                         "start in an existing folder");
-  return absolute.lexically_normal().string();
+  const std::filesystem::path normal = absolute.lexically_normal();
+  return (normal.has_filename() ? normal : normal.parent_path()).string();  // DIR/ is DIR
 }
 
 }  // namespace regrade

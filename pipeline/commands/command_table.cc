@@ -22,7 +22,7 @@ const std::vector<Command>& AllCommands() {
        RunRefine,
        "blocks part preset splats splat-steps photo-size max-memory device dry-run "
        "verbose"},
-      {"stylize", "DIR --style PICTURE [PICTURE ...] [OPTIONS]",
+      {"stylize", "DIR [--style PICTURE ...] [--name NAME] [OPTIONS]",
        "applies further styles to a finished reconstruction, each in DIR/styles/NAME",
        RunStylize,
        "preset style match name strength method masks style-mask film-seconds film-size device "

@@ -48,7 +48,7 @@ void ContinueStyle(const Command& command, const Arguments& arguments, const std
       throw UsageError("goes without --part", "--restart-from",
                        "remove parts/ of the style's folder to render parts again");
   }
-  ProbeStyles(&settings, console);
+  ProbeStyles(&settings, console, /*measured=*/!context.parts.One());
   const std::string given = context.options.Given("name").value_or("");
   Continue(folder, *prepared, {{ChosenStyle(folder, given), settings.style.pictures}}, first,
            &context);

@@ -3,7 +3,7 @@
 #include <filesystem>
 #include <utility>
 
-#include "evaluate/flow_folder.h"
+#include "evaluate/pair_motion.h"
 #include "kernels/base/error.h"
 #include "pipeline/commands/command.h"
 #include "pipeline/images/cube_file.h"
@@ -34,7 +34,7 @@ void CheckStyle(const std::string& path, const RunSettings& settings) {
   StyleExample(path, nullptr);
 }
 
-void ProbeStyles(RunSettings* settings, Console* console) {
+void ProbeStyles(RunSettings* settings, Console* console, bool measured) {
   RequireValue(settings->style.picture(), "--style", "name the style picture");
   for (std::string& picture : settings->style.pictures) {
     RequireValue(picture, "--style", "name the style picture");
@@ -54,10 +54,11 @@ void ProbeStyles(RunSettings* settings, Console* console) {
   ProbeMethod(&settings->style_2d,
               start.dry_run ? NetworkAccess() : AccessAfterYes(start.yes, console));
   ProbeMasks(&settings->object);
-  ProbeEvaluationNetworks(settings->consistency);
+  const bool measures = measured && (start.until == "evaluate" || start.until == "report");
+  if (measures) ProbeEvaluationNetworks(settings->consistency);
   for (const auto& [folder, option] :
        {std::pair{settings->residual.Layers(), "--residual layers:"},
-        {FlowFolderOf(settings->consistency.flow), "--flow files:"}})
+        {measures ? FlowFolderOf(settings->consistency.flow) : "", "--flow files:"}})
     if (!folder.empty() && !std::filesystem::is_directory(folder))
       throw InputError("there is no such folder", folder, std::string("correct ") + option);
 }

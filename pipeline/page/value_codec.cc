@@ -1,8 +1,5 @@
 #include "pipeline/page/value_codec.h"
 
-#include <algorithm>
-#include <cmath>
-
 #include "kernels/base/error.h"
 
 namespace regrade {

@@ -7,7 +7,6 @@
 // which are what is stored.
 #pragma once
 
-#include <cstdint>
 #include <vector>
 
 namespace regrade {

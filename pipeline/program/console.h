@@ -1,5 +1,5 @@
 // The program's messages: text and a progress line on stderr, JSON lines on stdout with --json,
-// and all messages in the output folder's log.
+// and all messages in the output folder's log; and questions to the person at the terminal.
 #pragma once
 
 #include <optional>

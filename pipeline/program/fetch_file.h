@@ -1,4 +1,5 @@
-// Fetches one small file over https: the only place from which this program calls a host.
+// Fetches one small file over https: the only place from which this program calls a
+// host; and the hash by which what was fetched is known.
 #pragma once
 
 #include <cstdint>

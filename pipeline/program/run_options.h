@@ -41,7 +41,8 @@ struct RunOptions {
   template <typename Bind>
   void Describe(Bind& bind) {
     bind("out", out,
-         {.help = "the output folder; the same command again continues what is in it"});
+         {.help = "the output folder; the same command again continues what is in it; not of "
+                  "commands that take DIR"});
     bind("preset", preset,
          {.help = "trade-off between accuracy and time; smoke only shows that everything runs",
           .choices = "smoke|draft|standard|paper|best"});
@@ -78,7 +79,7 @@ struct RunOptions {
 
 inline constexpr char kRequireHelp[] =
     "bounds of metrics, as styled:tc-psnr:1>=30,reconstruct:psnr-heldout>=25; where one does "
-    "not hold, the exit status is 8";
+    "not hold, the exit status is 8; not where nothing is measured";
 
 inline constexpr char kJUnitHelp[] =
     "writes the outcome of each bound of --require to this file, as JUnit XML for CI systems";

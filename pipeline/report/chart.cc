@@ -80,7 +80,7 @@ std::string FitChartHtml(const ReconstructReport& stage) {
     plot.series.push_back(Level("held-out photos, at the end", *stage.psnr_heldout_db.value,
                                 curve.front().first, curve.back().first, 2));
   plot.note = "PSNR of the reconstruction over " + std::to_string(curve.back().first) +
-              " steps, in dB; it bends where the voxel grid is refined.";
+              " steps, in dB.";
   return PlotHtml(plot);
 }
 

@@ -18,7 +18,7 @@ std::string SequenceLabel(const std::string& sequence) {
   if (sequence == "control_field_2d")
     return "control: field fitted to the 2D method's pictures";
   if (sequence == "control_ceiling")
-    return "control: every voxel fitted to the 2D method's pictures";
+    return "control: the scene's own colours fitted to the 2D method's pictures";
   return sequence;
 }
 

@@ -1,4 +1,4 @@
-// --residual: what is fitted for each voxel behind the network.
+// --residual: what is fitted for each splat or voxel behind the network.
 #pragma once
 
 #include <string>
@@ -20,7 +20,8 @@ struct ResidualChoice {
   void Describe(Bind& bind) {
     bind("residual", residual,
          {.help = "what the network does not carry of the 2D method, as a colour that is added "
-                  "at each voxel: none; views fits it to the method's pictures of all renders; "
+                  "at each splat or voxel: none; views fits it to the method's pictures of all "
+                  "renders; "
                   "layers:DIR, as `regrade retouch` sets it, also to what single photos have "
                   "beyond the method: 16-bit pictures by the photos' names, mid-grey where "
                   "that is nothing",

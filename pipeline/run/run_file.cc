@@ -57,6 +57,13 @@ JsonValue OptionsOf(const JsonValue& options) {
     const bool was_switch = name == "controls" && value.IsBool();
     kept[name] = was_switch ? JsonValue(value.AsBool() ? "on" : "off") : value;
   }
+  // What were two options is one.
+  if (const JsonValue* const field = options.Find("control-field");
+      field != nullptr && field->IsBool() && field->AsBool())
+    kept["controls"] = "field";
+  if (const JsonValue* const network = options.Find("match-network");
+      network != nullptr && network->IsString() && !network->AsString().empty())
+    kept["match"] = "regions:" + network->AsString();
   return kept;
 }
 
@@ -100,13 +107,16 @@ JsonValue::Object OptionsWithFolder(const JsonValue& options, const std::string&
   return replaced;
 }
 
-// The output folder that a run.json lies in, or else that of the run.
+// The output folder that a run.json lies in, or else, as of a text, that of the run.
 std::string OutputFolderOf(const std::string& path, const JsonValue& options) {
   namespace fs = std::filesystem;
   std::error_code error;
-  fs::path folder = fs::absolute(path, error).lexically_normal().parent_path();
-  if (folder.parent_path().filename() == "styles") folder = folder.parent_path().parent_path();
-  if (fs::exists(folder / ".regrade", error)) return folder.string();
+  const fs::path folder =
+      path.empty() ? fs::path() : fs::absolute(path, error).lexically_normal().parent_path();
+  const fs::path above = folder.parent_path().parent_path();  // of a style
+  if (folder.parent_path().filename() == "styles" && fs::exists(above / ".regrade", error))
+    return above.string();
+  if (!path.empty() && fs::exists(folder / ".regrade", error)) return folder.string();
   const JsonValue* const out = options.Find("out");
   return out != nullptr && out->IsString() ? out->AsString() : folder.string();
 }
@@ -147,7 +157,7 @@ ConfigFile ReadConfig(const std::string& text) {
     const bool of_options =
         value.IsObject() && value.Find("schema") == nullptr && value.Find("options") == nullptr;
     if (of_options) return {false, {{}, value}, name};
-    return {true, is_file ? InItsFolder(RunFileOf(value), name) : RunFileOf(value), name};
+    return {true, InItsFolder(RunFileOf(value), is_file ? text : ""), name};
   });
 }
 

@@ -130,7 +130,7 @@ void CheckTogether(const RunSettings& settings) {
     throw UsageError("voxels are fitted without depths", "--depth-network",
                      "leave it out, or give --field splats");
   if (settings.page.page == "on" && settings.scene.Kind().lattice)
-    throw UsageError("voxels have no page", "--page on", "leave it out, or fit splats");
+    throw UsageError("voxels have no page", "--page on", "give --page off, or fit splats");
   const StyleMethod method = ParseStyleMethod(settings.style_2d);
   CheckResidual(settings, method.kind);
   CheckMatch(settings);

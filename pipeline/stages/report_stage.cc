@@ -114,7 +114,7 @@ bool WriteScenePage(const RunContext& context, const ProgressFunction& progress)
   std::filesystem::remove(path);
   if (choice == "off") return false;
   if (CountSplats(context.workspace->Path("field.npz")) == 0) {
-    context.console->Info(Concat("no page: the scene is of voxels; ", kNoPage));
+    context.console->Detail(Concat("no page: the scene is of voxels; ", kNoPage));
     return false;
   }
   const std::string name = std::filesystem::path(style.folder()).filename().string();

@@ -1,5 +1,5 @@
 // Stage "pose" of a run that was given splats without photos: pictures of the splats take the
-// photos' places.
+// photos' places; and cameras for splats that have none.
 #pragma once
 
 #include <string>

@@ -78,7 +78,7 @@ StageOutcome StyleViews(RunContext* context, const ProgressFunction& progress) {
   const auto read = [&](int64_t view) {
     return is_known(view) ? views.Photo(static_cast<int>(view)) : Image();
   };
-  MakeAhead(count, views.PhotoBytes(), read, [&](int64_t view, Image photo) {
+  MakeAhead(count, LargestPhotoBytes(views.capture()), read, [&](int64_t view, Image photo) {
     const int i = static_cast<int>(view);
     ReportOrThrow(progress, i, count);
     if (!is_known(i)) return;

@@ -109,7 +109,7 @@ StyleTargets ReadStyleTargets(const Workspace& folder, const WorkingViews& views
   const auto name = [](int view) { return "views_2d/" + FrameName(view); };
   using Pictures = std::pair<Image, Image>;
   MakeAhead(
-      std::ssize(indices), views.PhotoBytes(),
+      std::ssize(indices), LargestPhotoBytes(views.capture()),
       [&](int64_t k) -> Pictures {
         const int i = indices[static_cast<size_t>(k)];
         return {views.Photo(i), ReadImage(folder.Path(name(i)))};

@@ -75,7 +75,7 @@ Holder ReadHolder(int fd) {
   return found;
 }
 
-// Another run may have replaced the file between open and flock.
+// The file may have been removed between open and flock.
 bool StillInPlace(int fd, const std::string& path) {
   struct stat ours, there;
   return ::fstat(fd, &ours) == 0 && ::lstat(path.c_str(), &there) == 0 &&

@@ -12,7 +12,6 @@
 #include "kernels/splats/cpu/seen_by_cameras.h"
 #include "kernels/splats/extent.h"
 #include "kernels/splats/splat_field.h"
-#include "pipeline/files/deflate.h"
 #include "pipeline/page/field_codec.h"
 #include "pipeline/page/most_shown.h"
 #include "pipeline/page/splat_numbers.h"

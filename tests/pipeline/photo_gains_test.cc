@@ -250,6 +250,12 @@ TEST(KeepExposure, WhatFramesAreComparedWithHasTheirExposures) {
   };
   std::map<std::string, double> one = metrics();
   run({"render", folder / "o", "--keep-exposure"}, {});
+  // Its voxels have no page.
+  for (const std::vector<std::string>& page :
+       {std::vector<std::string>{"page", folder / "o", "--out", folder / "p.html"},
+        {"view", folder / "o"}})
+    EXPECT_EQ(testing::ExitCodeOf(page), 3) << page[0];
+  EXPECT_EQ(testing::ExitCodeOf({"render", folder / "o", "--page", "on"}), 2);
   std::map<std::string, double> kept = metrics();
   EXPECT_GT(kept["control_ceiling"], kept["styled"]);
   EXPECT_GT(kept["linear_map_psnr_to_2d_db"], kept["source"]);

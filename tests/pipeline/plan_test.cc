@@ -114,6 +114,15 @@ TEST(StageEstimate, FollowsSizesAndTheMachinesPace) {
   EXPECT_GT(seconds(longer, size, "render"), 1.3 * seconds(settings, size, "render"));
   EXPECT_NEAR(SecondsOf(EstimateStages(settings, size, Backend::kCpu, 4), "render", "render"),
               0.5 * seconds(settings, size, "render"), 1e-9);
+  // --max-memory is kept, by a coarser grid, which is fitted sooner.
+  RunSettings limited = settings;
+  limited.run.max_memory_gb = 1.5;
+  const auto fit = [&](const RunSettings& of) {
+    return EstimateStages(of, size, Backend::kCpu, 2).at(1);
+  };
+  EXPECT_GT(fit(settings).memory, 1'500'000'000u);
+  EXPECT_LE(fit(limited).memory, 1'500'000'000u);
+  EXPECT_LT(fit(limited).seconds, fit(settings).seconds);
   // A machine of half the speed, and one whose record is no measure.
   EXPECT_NEAR(MeasuredPace(stages, {{"reconstruct", 2 * stages[1].seconds}}), 2, 1e-9);
   EXPECT_EQ(MeasuredPace(stages, {{"reconstruct", 1e-3 * stages[1].seconds}}), 0.25);

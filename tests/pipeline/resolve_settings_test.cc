@@ -206,19 +206,21 @@ TEST(ResolveSettings, OptionsOfEarlierVersionsAreDropped) {
       R"("fit-free-space": "auto", "fit-rate-density": "auto", "fit-rate-density-end": "auto", )"
       R"("tv-density": "auto", "tv-sh": "auto", "tv-decay": 0.7, "fit-rate-sh": 0.05, )"
       R"("fit-resolutions": [48, 96, 192, 384], "background-lead": 0.25, )"
-      R"("controls": true, "control-field": false, "match-network": "")";
+      R"("controls": true, "control-field": true, "match": "regions", )"
+      R"("match-network": "/f.onnx")";
   WriteText(run, R"({"arguments": ["/photos"], "options": {"preset": "draft", "fps": 12, )" +
                      earlier + "}}");
   for (const RunSettings& settings :
        {Resolve({}, {.run_json = run}).settings, Resolve({"--config", run}).settings}) {
     EXPECT_EQ(settings.render.fps, 12);
-    EXPECT_EQ(settings.consistency.controls, "on");
+    EXPECT_EQ(settings.consistency.controls, "field");
     EXPECT_EQ(settings.fit.rate_density, FitOptions().rate_density);
     EXPECT_EQ(settings.fit.tv_sh, FitOptions().tv_sh);
     EXPECT_EQ(settings.fit.tv_decay, FitOptions().tv_decay);
     EXPECT_EQ(settings.fit.rate_sh, FitOptions().rate_sh);
     EXPECT_LT(settings.fit.resolutions.back(), 384);
   }
+  EXPECT_EQ(Resolve({"--config", run}).settings.style.match.Network(), "/f.onnx");
   for (const char* config : {R"({"fit-field": "adaptive"})", R"({"tv-density": "auto"})"})
     EXPECT_REGRADE_ERROR(Resolve({"--field", "voxels", "--config", config}), ExitCode::kUsage,
                          config[2] == 'f' ? "fit-field" : "tv-density");

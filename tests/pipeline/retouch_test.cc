@@ -311,7 +311,7 @@ TEST(Retouch, ALocalEditIsLearnedFromItsPhotoAlone) {
   for (int y = 0; y < half.height; ++y)
     for (int i = 0; i < 3 * half.width / 2; ++i) half.at(0, y)[i] *= 0.15f;
   WritePng16(folder / "half.png", half);
-  testing::Said({"retouch", folder / "out", "--photo", "00002.png", "--edited",
+  testing::Said({"retouch", folder / "out/", "--photo", "00002.png", "--edited",
                  folder / "half.png", "--name", "half", "--until", "render"});
   // What shows the background, through holes of this small fit, takes no edit by place.
   const Image through = ReadImage(folder / "out/styles/half/frames/transmittance/00002.png");

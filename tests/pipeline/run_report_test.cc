@@ -159,6 +159,21 @@ TEST(RunReport, ShowsEveryPartOfTheRun) {
   testing::Said({"evaluate", folder / "e", "--gaps", "2"});
   for (const char* other : {"--format=csv", "--out=x", "--target=x"})
     EXPECT_EQ(Regrade({"evaluate", folder / "e", other}).code, 2) << other;
+  for (const std::vector<std::string>& nothing :
+       {std::vector<std::string>{"refine", folder / "e", "--require", "styled:tc-psnr:1>=1"},
+        {"render", folder / "e", "--part", "1/2", "--junit", folder / "j.xml"},
+        {"stylize", folder / "e", "--style", style, "--require", "styled:lpips-to-2d<=1"},
+        {"contact-sheet", folder / "e", "--out", folder / "x.jpg"},
+        {"export", folder / "e", "--format", "cube", "--out", folder / "x"}})
+    EXPECT_EQ(Regrade(nothing).code, 2) << nothing[0];
+  // Masks that no photo has are named before the fit.
+  std::filesystem::create_directories(folder / "none");
+  const testing::ProgramOutcome masked =
+      Regrade({"run", folder / "s/truth", "--style", style, "--out", folder / "masked",
+               "--masks", folder / "none", "--tracks", "given"});
+  EXPECT_EQ(masked.code, 3);
+  EXPECT_SAYS(masked, "has no picture with the name of a photo");
+  EXPECT_FALSE(std::filesystem::exists(folder / "masked/field.npz"));
   EXPECT_EQ(HeatMapsNamed(folder / "e/styles/style_sunset"), 6);
   EXPECT_EQ(HeatMapFiles(folder / "e/styles/style_sunset"), 6);
 

@@ -343,6 +343,7 @@ TEST(FolderLock, F39_TheFileOfALostLockIsNamed) {
       EXPECT_EQ(error.code(), ExitCode::kFolderInUse);
       return error.hint();
     }
+    ADD_FAILURE() << "the folder is not in use";
     return std::string();
   };
   EXPECT_EQ(hint().find(lock), std::string::npos);  // of a living process
