@@ -7,6 +7,7 @@
 #include "pipeline/capture/working_views.h"
 #include "pipeline/commands/continue_command.h"
 #include "pipeline/fields/field_file.h"
+#include "pipeline/fields/seen_field.h"
 #include "pipeline/files/text.h"
 #include "pipeline/images/still_file.h"
 #include "pipeline/program/device_choice.h"

@@ -9,6 +9,7 @@
 #include "pipeline/commands/command.h"
 #include "pipeline/dry_run.h"
 #include "pipeline/fields/field_file.h"
+#include "pipeline/fields/seen_field.h"
 #include "pipeline/files/atomic_file.h"
 #include "pipeline/files/json_file.h"
 #include "pipeline/files/text.h"

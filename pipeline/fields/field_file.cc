@@ -10,8 +10,6 @@
 #include "kernels/base/half.h"
 #include "kernels/field/spherical_harmonics.h"
 #include "kernels/scene/camera_checks.h"
-#include "kernels/splats/cpu/seen_by_cameras.h"
-#include "kernels/splats/splat_field.h"
 #include "pipeline/files/npz_file.h"
 
 namespace regrade {
@@ -310,17 +308,6 @@ StoredField ReadPartOfField(const std::string& path, const SplatFilter& keep) {
 
 StoredField ReadFieldGeometry(const std::string& path) {
   return ReadField(path, kMostField, {}, false);
-}
-
-StoredField SeenPart(StoredField geometry, const std::string& path,
-                     const std::vector<Camera>& cameras) {
-  if (geometry.field.geometry != nullptr && !geometry.field.geometry->splats.on())
-    return geometry;
-  geometry = {};
-  return ReadPartOfField(path, [&](const RadianceField& field) {
-    return SeenSplats(SplatsWithoutColors(field.geometry->splats), cameras,
-                      SplatOptionsOf(field));
-  });
 }
 
 }  // namespace regrade

@@ -67,11 +67,4 @@ StoredField ReadPartOfField(const std::string& path, const SplatFilter& keep);
 // Splats whose colours are one coefficient a channel, 0. Voxels are read whole.
 StoredField ReadFieldGeometry(const std::string& path);
 
-// `geometry`: what ReadFieldGeometry read of the file `path`; of splats it may be empty.
-// Returns of splats, with their colours, those in the picture of one of the cameras, which are
-// in the field's frame: their pictures have the same bits as those of the whole field. Memory:
-// see ReadPartOfField. Voxels are whole already.
-StoredField SeenPart(StoredField geometry, const std::string& path,
-                     const std::vector<Camera>& cameras);
-
 }  // namespace regrade

@@ -14,6 +14,7 @@
 #include "pipeline/fields/field_file.h"
 #include "pipeline/fields/object_file.h"
 #include "pipeline/fields/residual_file.h"
+#include "pipeline/fields/seen_field.h"
 #include "pipeline/files/text.h"
 #include "pipeline/images/image_file.h"
 #include "pipeline/page/check_page.h"

@@ -9,6 +9,7 @@
 #include "kernels/field/pad_sh_basis.h"
 #include "pipeline/fields/field_file.h"
 #include "pipeline/fields/film_timing.h"
+#include "pipeline/fields/seen_field.h"
 #include "pipeline/images/video_writer.h"
 #include "pipeline/stages/styled_field.h"
 #include "pipeline/workspace/style_folders.h"

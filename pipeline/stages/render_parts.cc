@@ -12,6 +12,7 @@
 #include "kernels/base/error.h"
 #include "pipeline/fields/field_file.h"
 #include "pipeline/fields/film_timing.h"
+#include "pipeline/fields/seen_field.h"
 #include "pipeline/files/atomic_file.h"
 #include "pipeline/files/npz_file.h"
 #include "pipeline/files/text.h"

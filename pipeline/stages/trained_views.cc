@@ -8,6 +8,7 @@
 #include "kernels/splats/cpu/seen_by_cameras.h"
 #include "kernels/splats/splat_field.h"
 #include "pipeline/fields/field_file.h"
+#include "pipeline/fields/seen_field.h"
 #include "pipeline/files/text.h"
 #include "pipeline/run/plan.h"
 

@@ -14,6 +14,7 @@
 #include "kernels/splats/rendered_splats.h"
 #include "pipeline/capture/working_views.h"
 #include "pipeline/fields/field_file.h"
+#include "pipeline/fields/seen_field.h"
 #include "pipeline/fields/splat_checkpoint.h"
 #include "pipeline/fields/splat_ply.h"
 #include "pipeline/images/still_file.h"
