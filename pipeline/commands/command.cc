@@ -93,8 +93,7 @@ void PrintHelp(const Command& command, const Arguments& arguments, bool continue
     if (continues)
       std::printf(
           "\nWhat is not given is as in run.json of DIR, or of the style that is continued; "
-          "what "
-          "its poses and its fit need stays so.\n");
+          "what its poses and its fit need stays so.\n");
   }
 }
 

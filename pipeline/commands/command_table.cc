@@ -48,8 +48,7 @@ const std::vector<Command>& AllCommands() {
        RunEvaluate},
       {"study", "A B [C ...] --out FILE.html [OPTIONS] | ANSWERS.json ...",
        "makes a page that asks people which film they prefer; of their answers it tells "
-       "preference "
-       "shares with intervals, Bradley-Terry strengths, and a test of each pair",
+       "preference shares with intervals, Bradley-Terry strengths, and a test of each pair",
        RunStudy},
       {"tradeoff", "PHOTOS|CAPTURE|DIR --out DIR [--style PICTURE] [OPTIONS]",
        "measures on this machine how each parameter trades time for accuracy", RunTradeoff,

@@ -44,8 +44,7 @@ struct FramesOptions {
     bind("protocol", protocol,
          {.help = "a published protocol by name, also for runs: sets --mode, --gaps, "
                   "--warp and --error-per where it says so, and refuses other values; geometry "
-                  "of frames needs "
-                  "--cameras and --depth; evaluate/PROTOCOLS.md defines each",
+                  "of frames needs --cameras and --depth; evaluate/PROTOCOLS.md defines each",
           .choices = ProtocolChoices()});
     bind("format", format,
          {.help = "form of the printed tables; latex needs the package booktabs",

@@ -95,7 +95,7 @@ const Camera& HomeOf(const PageContent& content) {
   return content.cameras[static_cast<size_t>(content.home)];
 }
 
-// The field, and beside it the photos, which take one core.
+// The field, and beside it the photos.
 void EncodeScene(const RadianceField& field, const WorkingViews& views, bool named,
                  PageContent* content) {
   std::future<void> beside =

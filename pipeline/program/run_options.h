@@ -65,8 +65,7 @@ struct RunOptions {
          {.help = "effects to model: auto measures whether each is needed; a list such as "
                   "ndc=off,exposure=on overrides that for ndc (of voxels), alpha, background, "
                   "exposure, view-dependence (of splats on) and pose-refinement; falloff=on "
-                  "undoes what a lens darkens "
-                  "in the corners"});
+                  "undoes what a lens darkens in the corners"});
     bind("max-memory", max_memory_gb,
          {.unit = "GB", .help = kMaxMemoryHelp, .min = 0, .max = 1e6});
     bind("reproducible", reproducible,

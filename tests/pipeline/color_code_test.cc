@@ -1,4 +1,4 @@
-// The code of a voxel's colours: numbers fit their bits, errors are as small as these allow.
+// The code of a splat's colours: numbers fit their bits, errors are as small as these allow.
 #include "pipeline/page/color_code.h"
 
 #include <gtest/gtest.h>
@@ -30,15 +30,15 @@ std::vector<float> SomeValues(int n, int basis, double view) {
 }
 
 std::vector<int64_t> AllOf(size_t n) {
-  std::vector<int64_t> voxel(n);
-  std::iota(voxel.begin(), voxel.end(), 0);
-  return voxel;
+  std::vector<int64_t> splat(n);
+  std::iota(splat.begin(), splat.end(), 0);
+  return splat;
 }
 
 std::vector<int16_t> Numbers(const std::vector<float>& values, const ColorCode& code,
                              int basis) {
-  const std::vector<int64_t> voxel = AllOf(values.size() / static_cast<size_t>(3 * basis));
-  return NumbersOf({values.data(), basis, voxel}, code);
+  const std::vector<int64_t> splat = AllOf(values.size() / static_cast<size_t>(3 * basis));
+  return NumbersOf({values.data(), basis, splat}, code);
 }
 
 std::vector<float> Values(const std::vector<int16_t>& numbers, const ColorCode& code,
@@ -126,26 +126,26 @@ TEST(PageColorCode, JsonComesBackAndDamageIsRefused) {
   EXPECT_REGRADE_ERROR(ColorCodeOf(few), ExitCode::kInput, "27 expected");
 }
 
-// Voxels of a field in another order have its numbers in that order, and go back to their rows.
+// Splats of a field in another order have its numbers in that order, and go back to their rows.
 TEST(PageColorCode, RowsMayComeInAnyOrder) {
   const std::vector<float> values = SomeValues(30, 9, 0.4);
   const ColorCode code = FitColorCode(values, values, 9, 0.03);
   const std::vector<int16_t> all = Numbers(values, code, 9);
-  const std::vector<int64_t> voxel = {17, 3, 29, 0};
-  const std::vector<int16_t> chosen = NumbersOf({values.data(), 9, voxel}, code);
+  const std::vector<int64_t> splat = {17, 3, 29, 0};
+  const std::vector<int16_t> chosen = NumbersOf({values.data(), 9, splat}, code);
   std::vector<float> back(values.size());
-  PutValues(chosen, code, 9, voxel, back.data());
+  PutValues(chosen, code, 9, splat, back.data());
   const std::vector<float> rounded = Values(all, code, 9);
-  for (size_t i = 0; i < voxel.size(); ++i)
+  for (size_t i = 0; i < splat.size(); ++i)
     for (size_t c = 0; c < 27; ++c) {
-      EXPECT_EQ(chosen[c * 4 + i], all[c * 30 + static_cast<size_t>(voxel[i])]);
-      EXPECT_EQ(back[27 * static_cast<size_t>(voxel[i]) + c],
-                rounded[27 * static_cast<size_t>(voxel[i]) + c]);
+      EXPECT_EQ(chosen[c * 4 + i], all[c * 30 + static_cast<size_t>(splat[i])]);
+      EXPECT_EQ(back[27 * static_cast<size_t>(splat[i]) + c],
+                rounded[27 * static_cast<size_t>(splat[i]) + c]);
     }
-  EXPECT_EQ(back[27], 0);  // of voxel 1, which was not chosen
+  EXPECT_EQ(back[27], 0);  // of splat 1, which was not chosen
 }
 
-TEST(PageColorCode, AMillionVoxelsAreFittedToSome) {
+TEST(PageColorCode, AMillionSplatsAreFittedToSome) {
   EXPECT_EQ(FittedRows(5).size(), 5u);
   EXPECT_TRUE(FittedRows(0).empty());
   const std::vector<size_t> some = FittedRows(1000000);
@@ -154,7 +154,7 @@ TEST(PageColorCode, AMillionVoxelsAreFittedToSome) {
   EXPECT_GT(some.back(), 999990u);
 }
 
-// A field of one colour, or without voxels, has a code.
+// A field of one colour, or without splats, has a code.
 TEST(PageColorCode, NothingToDecorrelate) {
   const std::vector<float> grey(27 * 10, 0.25f);
   const ColorCode code = FitColorCode(std::vector<float>(27 * 10, 0.0f), grey, 9, 0.03);

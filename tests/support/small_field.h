@@ -21,10 +21,16 @@ inline GridFrame SmallFrame(const Vec3i& resolution) {
   return {resolution, {0.1f, -0.2f, 0.05f}, {1.0f, 0.9f, 1.1f}};
 }
 
-// A field of `count` values on the given geometry: densities in [-2, 10) per world unit, so
-// ReLU makes some of them empty.
-inline RadianceField RandomValues(std::shared_ptr<Geometry> geometry, int64_t count, int basis,
-                                  uint64_t seed) {
+// About a fraction `fill` of the vertices is stored, with densities in [-2, 10) per world unit,
+// so ReLU makes some of them empty.
+inline RadianceField RandomField(const Vec3i& resolution, int basis, double fill,
+                                 uint64_t seed) {
+  auto geometry = std::make_shared<Geometry>();
+  geometry->frame = SmallFrame(resolution);
+  geometry->links.Resize(geometry->frame.NumVertices());
+  int32_t count = 0;
+  for (int64_t v = 0; v < geometry->links.size(); ++v)
+    geometry->links[v] = RandomDouble(seed, 1, static_cast<uint64_t>(v)) < fill ? count++ : -1;
   geometry->density.Resize(count);
   RadianceField field;
   field.appearance.basis = basis;
@@ -38,18 +44,6 @@ inline RadianceField RandomValues(std::shared_ptr<Geometry> geometry, int64_t co
   field.geometry = std::move(geometry);
   field.background = {0.3f, 0.6f, 0.2f};
   return field;
-}
-
-// About a fraction `fill` of the vertices is stored.
-inline RadianceField RandomField(const Vec3i& resolution, int basis, double fill,
-                                 uint64_t seed) {
-  auto geometry = std::make_shared<Geometry>();
-  geometry->frame = SmallFrame(resolution);
-  geometry->links.Resize(geometry->frame.NumVertices());
-  int32_t count = 0;
-  for (int64_t v = 0; v < geometry->links.size(); ++v)
-    geometry->links[v] = RandomDouble(seed, 1, static_cast<uint64_t>(v)) < fill ? count++ : -1;
-  return RandomValues(std::move(geometry), count, basis, seed);
 }
 
 // A ball around the origin whose density grows by `slope` a unit of depth, of color(position,
